@@ -760,7 +760,7 @@ class ServeMqtt(TypedDict):
     """the topic that holds `online` as long as the service is connected, and `offline` after it (a last will)
     (topic; default: none)"""
 
-    qos: NotRequired[Number]
+    qos: NotRequired[Literal[0, 1]]
     """whether messages are acknowledged, and sent again until they are (1), or not (0) (0, 1; default: 1)"""
 
     retain: NotRequired[bool]
@@ -782,7 +782,8 @@ class ServeOpcua(TypedDict):
     (table: estimate = node; default: none: nothing is written)"""
 
     interval: NotRequired[Number]
-    """seconds between what the server sends; every change in between is in it (number > 0; default: 0.5)"""
+    """seconds between what the server sends; every change in between is in it (number in [0.01, 3600.0];
+    default: 0.5)"""
 
     user: NotRequired[str]
     """who this is to the server (text; default: none: anonymous)"""

@@ -60,6 +60,9 @@ pub fn largest_gain(study: &str) -> Result<f64, String> {
         .filter_map(Value::as_object)
         .flat_map(|row| row.values());
     let constant = entries.filter_map(Value::as_f64);
+    let corrections = answer["injection"].as_object().into_iter().flatten();
+    let corrections = corrections.filter_map(|(_, row)| row.as_object()).flatten();
+    let numbers = corrections.filter_map(|(_, entry)| entry["expression"].as_str()?.parse().ok());
     let parameters = answer["parameters"].as_object();
     let made_of = |name: &str| name.starts_with("rΔS⁻¹Cᵀ") || name.starts_with("Δ⁻¹K");
     let lists = parameters
@@ -70,7 +73,11 @@ pub fn largest_gain(study: &str) -> Result<f64, String> {
     let moving = lists
         .flat_map(|list| list.split(", "))
         .filter_map(|x| x.parse().ok());
-    Ok(constant.chain(moving).map(f64::abs).fold(0.0, f64::max))
+    Ok(constant
+        .chain(numbers)
+        .chain(moving)
+        .map(f64::abs)
+        .fold(0.0, f64::max))
 }
 
 /// Certifies a study given as text.

@@ -17,8 +17,10 @@ const STEP: f64 = 0.1;
 const INPUT: f64 = 0.7;
 /// Rows before the figures: P has filled, and there is machine code.
 const ROWS: usize = 10_000;
-/// Windows of so many rows are timed, of which the least counts.
-const WINDOWS: usize = 10;
+/// Windows of at least so many seconds are timed, of which the least counts: processor time is counted in steps of
+/// some milliseconds.
+const WINDOWS: usize = 5;
+const WINDOW_SECONDS: f64 = 0.2;
 const FLEET: usize = 1_000;
 /// Rows of a window that all filters go through.
 const FLEET_ROWS: usize = 50;
@@ -117,11 +119,14 @@ fn end(filter: &Estimator) -> Vec<f64> {
 /// Seconds of a sample of a filter that has come so far.
 fn sample(filter: &mut Estimator) -> Result<f64, Error> {
     let mut least = f64::INFINITY;
-    for window in 1..=WINDOWS {
-        let readings = readings(ROWS, STEP * (window * ROWS) as f64);
-        let clock = Clock::start();
-        run(filter, &readings, window * ROWS)?;
-        least = least.min(clock.seconds() / ROWS as f64);
+    let mut first = ROWS;
+    for _ in 0..WINDOWS {
+        let (begun, clock) = (first, Clock::start());
+        while clock.seconds() < WINDOW_SECONDS {
+            run(filter, &readings(ROWS, STEP * first as f64), first)?;
+            first += ROWS;
+        }
+        least = least.min(clock.seconds() / (first - begun) as f64);
     }
     Ok(least)
 }

@@ -38,7 +38,7 @@ arithmetic!(Four: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_m
 arithmetic!(Eight: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
 
 impl Vector for Four {
-    instructions!(and _mm256_and_pd, or _mm256_or_pd, xor _mm256_xor_pd);
+    instructions!(and _mm256_and_pd, or _mm256_or_pd, xor _mm256_xor_pd, smaller _mm256_min_pd);
 
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
@@ -132,7 +132,7 @@ impl Four {
 }
 
 impl Vector for Eight {
-    instructions!(and _mm512_and_pd, or _mm512_or_pd, xor _mm512_xor_pd);
+    instructions!(and _mm512_and_pd, or _mm512_or_pd, xor _mm512_xor_pd, smaller _mm512_min_pd);
 
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {

@@ -316,6 +316,8 @@ pub enum Shape {
         /// the most
         most: f64,
     },
+    /// one of these whole numbers
+    OneOf(&'static [u32]),
     /// a whole number of at least this
     Whole(u32),
     /// true or false
@@ -355,6 +357,10 @@ impl Shape {
             Self::NotNegative => "number ≥ 0".to_owned(),
             Self::Share => "number between 0 and 1".to_owned(),
             Self::Between { least, most } => format!("number in [{least:?}, {most:?}]"),
+            Self::OneOf(numbers) => {
+                let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
+                numbers.join(", ")
+            }
             Self::Whole(least) => format!("whole number ≥ {least}"),
             Self::Flag => "true, false".to_owned(),
             Self::Text => "text".to_owned(),

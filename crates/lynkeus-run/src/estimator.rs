@@ -6,6 +6,7 @@ use crate::filter::{self, Health, Innovation, Record, Smoothed};
 use crate::runner::{Runner, Sample, check_time, no_number};
 use crate::sampled::Sampled;
 use crate::snapshot::{self, Damaged, Walk};
+use crate::standing::Standing;
 use crate::{
     Blueprint, Error, EstimatorSettings, Result, SnapshotFault, StepAdvice, System, Updates,
 };
@@ -293,6 +294,68 @@ impl Estimator {
         snapshot::load(&state, |walk| restored.walk(walk, true))
             .map_err(|_| refused(SnapshotFault::Damaged))?;
         *self = restored;
+        Ok(())
+    }
+
+    /// Where it stands, by name: what an observer with other numbers goes on from ([`resume`](Self::resume)); none before
+    /// the first sample.
+    #[must_use]
+    pub fn standing(&self) -> Option<Standing> {
+        let time = self.time?;
+        let signals = self.names.iter().cloned().zip(self.signals.iter().copied());
+        let stand = self.runner.stand();
+        let states = stand.names.iter().cloned().zip(stand.x.iter().copied());
+        Some(Standing {
+            time,
+            inputs: signals.skip(self.sensors).collect(),
+            states: states.collect(),
+            own: stand.own,
+            errors: stand.errors,
+            estimates: self
+                .names()
+                .iter()
+                .cloned()
+                .zip(self.estimate().iter().copied())
+                .collect(),
+        })
+    }
+
+    /// Goes on, before its first sample, from where another observer stands that has the same states and other numbers:
+    /// parameters, noises, a tuning, bounds, sensors, steps. States and what is known of their errors are taken over by
+    /// name; all else begins anew, and where an observer does not follow errors they begin as at a start. Where it fails
+    /// nothing changes.
+    ///
+    /// # Errors
+    /// [`Error::Setting`]: it has had a sample, has other states, or knows of errors in another way (particles);
+    /// [`Error::NoNumber`] for an input of which the other one knows nothing; those of [`predict`](Self::predict).
+    pub fn resume(&mut self, standing: &Standing) -> Result<()> {
+        if let Some(t) = self.time {
+            return Err(Error::setting("time of the estimator", "none so far", t));
+        }
+        check_time(None, standing.time)?;
+        let mut own = self.clone();
+        own.time = Some(standing.time);
+        own.signals[..own.sensors].fill(f64::NAN);
+        for (name, signal) in own.names.iter().zip(&mut own.signals).skip(own.sensors) {
+            let mut inputs = standing.inputs.iter();
+            let known = inputs.find(|(known, _)| known == name);
+            let value = known.map_or(f64::NAN, |(_, value)| *value);
+            if !value.is_finite() {
+                return Err(no_number(name, value));
+            }
+            *signal = value;
+        }
+        let (readings, inputs) = own.signals.split_at(own.sensors);
+        let sample = Sample {
+            t: standing.time,
+            readings,
+            inputs,
+            held: 0,
+        };
+        own.runner.begin(&sample)?;
+        own.runner.resume(&sample, standing)?;
+        own.runner.report(standing.time)?;
+        *self = own;
         Ok(())
     }
 

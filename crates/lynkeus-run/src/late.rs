@@ -1,11 +1,12 @@
 //! Readings that come late, put in their place while an estimator runs.
 
 use std::collections::VecDeque;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 use crate::filter::Innovation;
 use crate::runner::no_number;
 use crate::snapshot::{self, Damaged, Walk};
+use crate::standing::Standing;
 use crate::{Digest, Error, Estimator, Result, SnapshotFault};
 
 /// Times that differ by less than so many roundings are one: t − delay does not meet the row that is meant to the bit.
@@ -82,6 +83,13 @@ struct Row {
     image: Option<Vec<u64>>,
 }
 
+/// A row that comes.
+struct Arrived {
+    row: Row,
+    /// signals of which it knows better than what is there, also where nothing was read
+    replaced: Range<usize>,
+}
+
 /// What an estimator makes of a row that it goes over again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Revised {
@@ -93,6 +101,28 @@ pub struct Revised {
     pub deviations: Option<Vec<f64>>,
     /// what became of its readings, as [`Estimator::innovations`]
     pub innovations: Vec<Innovation>,
+}
+
+/// Where a [`Late`] stands, by name, with the rows that it keeps: what one with other numbers goes on from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Handover {
+    /// where the estimator stood before the rows; none before the first of all
+    pub standing: Option<Standing>,
+    /// names of the signals
+    pub signals: Vec<String>,
+    /// in the order of time
+    pub rows: Vec<HandoverRow>,
+}
+
+/// What was read at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandoverRow {
+    /// when
+    pub t: f64,
+    /// by signal, NaN where nothing was read; none of a prediction
+    pub signals: Vec<f64>,
+    /// it is not only that of a sample that came late
+    pub is_own: bool,
 }
 
 impl Late {
@@ -182,23 +212,53 @@ impl Late {
         if !self.keeps() {
             return self.estimator.push(t, signals);
         }
+        self.check(t, signals)?;
+        self.arrive(self.taken(t, signals, false), t)
+    }
+
+    /// As [`push`](Self::push) of several rows at once, whose readings take the place of those that were there at their
+    /// times: one that turns out to be none is taken back.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push), and [`Error::Setting`] where nothing is waited for.
+    pub fn correct(&mut self, rows: &[(f64, Vec<f64>)]) -> Result<&[f64]> {
+        self.revised.clear();
+        if !self.keeps() {
+            return Err(Error::setting("the time to wait", "one > 0", self.wait));
+        }
+        let mut arrived = vec![];
+        let mut newest = f64::NEG_INFINITY;
+        for (t, signals) in rows {
+            self.check(*t, signals)?;
+            arrived.append(&mut self.taken(*t, signals, true));
+            newest = newest.max(*t);
+        }
+        arrived.sort_by(|a, b| a.row.t.total_cmp(&b.row.t));
+        self.arrive(arrived, newest)
+    }
+
+    fn check(&self, t: f64, signals: &[f64]) -> Result<()> {
         let names = self.estimator.signals();
         if signals.len() != names.len() {
             let expected = format!("{}: {}", names.len(), names.join(", "));
             return Err(Error::setting("number of signals", expected, signals.len()));
         }
-        if !t.is_finite() {
-            return Err(no_number("t", t));
+        match t.is_finite() {
+            true => Ok(()),
+            false => Err(no_number("t", t)),
         }
+    }
+
+    /// Takes rows in the order of time, of which the newest came at `t`.
+    fn arrive(&mut self, arrived: Vec<Arrived>, t: f64) -> Result<&[f64]> {
         let came = self.estimator.time().unwrap_or(t).max(t);
-        let arrived = self.taken(t, signals);
         let oldest = came - self.wait;
         let first = self.rows.front().filter(|_| !self.is_whole);
         let is_old = |row: &&Row| {
             let is_before = |t: f64| row.t < t && !is_of_row(row.t, t, came);
             is_before(oldest) || first.is_some_and(|first| is_before(first.t))
         };
-        if let Some(old) = arrived.iter().find(is_old) {
+        if let Some(old) = arrived.iter().map(|arrived| &arrived.row).find(is_old) {
             self.too_late += 1;
             let time = old.t;
             return Err(Error::TooLate { time, oldest });
@@ -219,25 +279,31 @@ impl Late {
     }
 
     /// The rows that such a row stands for, in order: itself, and those of samples that were taken before it.
-    fn taken(&self, t: f64, signals: &[f64]) -> Vec<Row> {
+    fn taken(&self, t: f64, signals: &[f64], replaces: bool) -> Vec<Arrived> {
         let mut own = Row::new(t, signals.to_vec(), true);
         let mut rows = vec![];
         for (sensor, delay) in self.delays.iter().enumerate() {
-            if *delay > 0.0 && signals[sensor].is_finite() {
+            if *delay > 0.0 && (signals[sensor].is_finite() || replaces) {
                 let mut alone = vec![f64::NAN; signals.len()];
                 std::mem::swap(&mut alone[sensor], &mut own.signals[sensor]);
-                rows.push(Row::new(t - delay, alone, false));
+                rows.push(Arrived {
+                    row: Row::new(t - delay, alone, false),
+                    replaced: if replaces { sensor..sensor + 1 } else { 0..0 },
+                });
             }
         }
-        rows.push(own);
-        rows.sort_by(|a, b| a.t.total_cmp(&b.t));
+        rows.push(Arrived {
+            row: own,
+            replaced: if replaces { 0..self.delays.len() } else { 0..0 },
+        });
+        rows.sort_by(|a, b| a.row.t.total_cmp(&b.row.t));
         rows
     }
 
     /// Puts what arrived, in order, where it belongs, and goes over all that is after it.
-    fn take(&mut self, arrived: Vec<Row>, came: f64) -> Result<()> {
+    fn take(&mut self, arrived: Vec<Arrived>, came: f64) -> Result<()> {
         let reached = |row: &Row, t: f64| row.t < t && !is_of_row(t, row.t, came);
-        let first = arrived.first().map_or(came, |row| row.t);
+        let first = arrived.first().map_or(came, |arrived| arrived.row.t);
         let mut from = self.rows.partition_point(|row| reached(row, first));
         if from < self.rows.len() {
             let mut back = self.rows.range(..=from);
@@ -248,16 +314,21 @@ impl Late {
         }
         let old = self.rows.range(from..);
         let mut again: Vec<Row> = old.map(Row::without_image).collect();
-        for row in arrived {
+        for Arrived { row, replaced } in arrived {
             let place = again.partition_point(|known| reached(known, row.t));
-            match again
-                .get_mut(place)
-                .filter(|known| is_of_row(row.t, known.t, came))
-            {
-                Some(known) => known.join(&row),
+            let known = again.get_mut(place);
+            match known.filter(|known| is_of_row(row.t, known.t, came)) {
+                Some(known) => {
+                    known.join(&row);
+                    // of a sensor whose samples come late this row says nothing
+                    let replaced =
+                        replaced.filter(|sensor| !row.is_own || self.delays[*sensor] == 0.0);
+                    replaced.for_each(|sensor| known.signals[sensor] = row.signals[sensor]);
+                }
                 None => again.insert(place, row),
             }
         }
+        again.retain(Row::is_there);
         if self.estimator.time().is_none() {
             self.begin(&mut again);
         }
@@ -373,6 +444,91 @@ impl Late {
         Ok(())
     }
 
+    /// Where it stands before the rows that it keeps, and these: what [`take_over`](Self::take_over) of another one takes.
+    #[must_use]
+    pub fn handover(&self) -> Handover {
+        let first = self.rows.front().and_then(|row| row.image.as_ref());
+        let standing = match first {
+            None => self.estimator.standing(),
+            Some(image) => {
+                let mut before = self.estimator.clone();
+                before.go_back(image);
+                before.standing()
+            }
+        };
+        let rows = self.rows.iter().map(|row| HandoverRow {
+            t: row.t,
+            signals: row.signals.clone(),
+            is_own: row.is_own,
+        });
+        Handover {
+            standing,
+            signals: self.estimator.signals().to_vec(),
+            rows: rows.collect(),
+        }
+    }
+
+    /// Goes on, before its first row, from where another one stands that has the same states and other numbers, as
+    /// [`Estimator::resume`]; the rows that the other one keeps are gone over again, so that what comes late finds its
+    /// place among them. Where it fails nothing changes.
+    ///
+    /// # Errors
+    /// As [`Estimator::resume`], and of the rows as [`Estimator::push`].
+    pub fn take_over(&mut self, from: &Handover) -> Result<()> {
+        let mut own = self.clone();
+        if let Some(standing) = &from.standing {
+            own.estimator.resume(standing)?;
+            own.is_whole = false;
+            if own.keeps() {
+                own.rows.push_back(Row {
+                    image: Some(own.estimator.image()),
+                    ..Row::new(standing.time, vec![], false)
+                });
+            }
+        }
+        let names = own.estimator.signals();
+        let places = names
+            .iter()
+            .map(|name| from.signals.iter().position(|known| known == name));
+        let places: Vec<Option<usize>> = places.collect();
+        let of = |row: &HandoverRow| {
+            let value = |place: &Option<usize>| {
+                let value = place.and_then(|place| row.signals.get(place));
+                value.copied().unwrap_or(f64::NAN)
+            };
+            let signals = match row.signals.is_empty() {
+                true => vec![],
+                false => places.iter().map(value).collect(),
+            };
+            Row::new(row.t, signals, row.is_own)
+        };
+        let mut rows: Vec<Row> = from.rows.iter().map(of).collect();
+        let newest = rows.last().map(|row| row.t);
+        if own.keeps() {
+            if let Some(newest) = newest {
+                let arrived = rows.into_iter().map(|row| Arrived {
+                    row,
+                    replaced: 0..0,
+                });
+                own.take(arrived.collect(), newest)?;
+                own.forget(newest - own.wait);
+            }
+        } else {
+            if own.estimator.time().is_none() {
+                own.begin(&mut rows);
+            }
+            for row in &rows {
+                match row.signals.is_empty() {
+                    true => own.estimator.predict(row.t)?,
+                    false => own.estimator.push(row.t, &row.signals)?,
+                };
+            }
+        }
+        own.revised.clear();
+        *self = own;
+        Ok(())
+    }
+
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.estimator.walk_state(walk)?;
         walk.count(&mut self.stride)?;
@@ -406,6 +562,11 @@ impl Row {
             is_own,
             image: None,
         }
+    }
+
+    /// Whether there is something to go over; a prediction has no signals.
+    fn is_there(&self) -> bool {
+        self.is_own || self.signals.is_empty() || self.signals.iter().any(|y| y.is_finite())
     }
 
     fn without_image(&self) -> Self {

@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use crate::filter::health::{Health, Innovation};
 use crate::filter::{Record, Smoothed};
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::standing::{Stand, Standing};
 use crate::{Error, Result, StepAdvice};
 
 /// A sample as an observer takes it.
@@ -82,6 +83,15 @@ pub(crate) trait Runner: Persist + Debug + Send + Sync {
     fn walk_history(&mut self, _: &mut Walk<'_>) -> Result<(), Damaged> {
         Ok(())
     }
+
+    /// Where it stands after a sample.
+    fn stand(&self) -> Stand<'_>;
+
+    /// To where another one stood at the time of this sample, which has no readings.
+    ///
+    /// # Errors
+    /// [`Error::Setting`]: it has other states, or knows of errors in another way.
+    fn resume(&mut self, sample: &Sample<'_>, standing: &Standing) -> Result<()>;
 
     fn copied(&self) -> Box<dyn Runner>;
 }

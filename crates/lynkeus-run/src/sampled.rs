@@ -8,6 +8,7 @@ use crate::method::are_finite;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::Spread;
+use crate::standing::{Errors, Stand, Standing};
 use crate::{Blueprint, Dynamics, Error, Events, Integrator, Result, StepAdvice};
 
 /// An observer whose readings [jump](crate::Updates::Jumps), under way.
@@ -79,6 +80,12 @@ impl Sampled {
             true => Ok(()),
             false => Err(evaluation.not_finite(t, &self.x)),
         }
+    }
+
+    /// States that are neither readings nor there for the errors alone.
+    fn own(&self) -> usize {
+        let all = self.x.len() - self.sensors;
+        self.spread.as_ref().map_or(all, |spread| spread.own)
     }
 
     fn told(&self) -> usize {
@@ -180,6 +187,30 @@ impl Runner for Sampled {
 
     fn advice(&self) -> Option<StepAdvice> {
         self.integrator.advice()
+    }
+
+    fn stand(&self) -> Stand<'_> {
+        Stand {
+            names: self.driven.system().states(),
+            own: self.own(),
+            x: &self.x,
+            errors: match &self.spread {
+                Some(spread) => Errors::Root(spread.belief.root.entries.clone()),
+                None => Errors::Unknown,
+            },
+        }
+    }
+
+    /// A sensor that was none before has what the model says of it.
+    fn resume(&mut self, sample: &Sample<'_>, standing: &Standing) -> Result<()> {
+        let places = standing.places(self.driven.system().states(), self.own())?;
+        standing.fill(&places, &mut self.x);
+        self.bound.see(&self.x);
+        self.start(sample);
+        match &mut self.spread {
+            Some(spread) => standing.fill_root(&places, &mut spread.belief.root),
+            None => Ok(()),
+        }
     }
 
     fn copied(&self) -> Box<dyn Runner> {

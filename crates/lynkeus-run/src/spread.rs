@@ -164,7 +164,7 @@ impl NoisyPlant<'_> {
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
     pub propagation: Propagation,
-    belief: Belief,
+    pub belief: Belief,
     /// the covariance from an exact start, where readings are judged
     settled: Option<Root>,
     jacobians: Jacobians<Jacobian>,
@@ -173,6 +173,8 @@ pub(crate) struct Spread {
     sensors: Vec<Sensor>,
     /// so many states before the measurements are drawn anew in every row
     drawn: usize,
+    /// so many states before these are the observer's
+    pub own: usize,
     expected: OutputMap,
     /// of the last readings; empty where they are not judged
     pub innovations: Vec<Innovation>,
@@ -206,6 +208,9 @@ impl Spread {
             values: vec![0.0; flow.outputs().len()],
             sensors: model.sensors.clone(),
             drawn: model.drawn,
+            own: model
+                .lag
+                .unwrap_or(flow.states().len() - model.sensors.len() - model.drawn),
             expected: OutputMap::new(&model.output_map),
             innovations: vec![Innovation::default(); judged],
             deviations: vec![0.0; model.estimates],

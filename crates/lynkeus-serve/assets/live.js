@@ -72,7 +72,7 @@ function plot(room, hasBand, label, values, more = []) {
               { label: "+ 2 sd", stroke: "transparent", points: { show: false } },
           ]
         : [];
-    const isDate = rows.length > 0 && typeof rows[rows.length - 1].line[data.time] === "string";
+    const isDate = rows.some(({ line }) => typeof line[data.time] === "string");
     const axis = { stroke: css("--faint"), grid: { stroke: css("--grid"), width: 1 } };
     return new uPlot(
         {
@@ -159,8 +159,11 @@ async function attempt(event) {
     event.preventDefault();
     const [key, value] = [byId("key").value, byId("value").value];
     byId("tried").textContent = "…";
-    const answer = await fetch("try?" + asking({ asset: choice.value, key, value }), { method: "POST" });
-    const found = await answer.json();
+    const asset = choice.value;
+    const found = await fetch("try?" + asking({ asset, key, value }), { method: "POST" })
+        .then((answer) => answer.json())
+        .catch(() => ({ error: "no answer" }));
+    if (asset !== choice.value) return;
     trials.forEach((plot) => plot.destroy());
     byId("trials").replaceChildren();
     if (found.error) {
@@ -182,9 +185,23 @@ async function attempt(event) {
 }
 
 async function prove() {
-    const answer = await fetch("proved?" + asking({}));
-    if (answer.ok) byId("proved").innerHTML = await answer.text();
+    const answer = await fetch("proved?" + asking({})).catch(() => null);
+    if (answer?.ok) byId("proved").innerHTML = await answer.text();
     else setTimeout(prove, 5000);
+}
+
+// A browser tries again by itself where a connection is lost, but not where something else answers: a proxy in front of a
+// service that starts again, a service with too many listeners.
+function listen(query) {
+    const own = new EventSource("events?" + query);
+    source = own;
+    own.onmessage = (event) => take(JSON.parse(event.data));
+    own.addEventListener("innovations", own.onmessage);
+    own.onerror = () => {
+        byId("status").textContent = "no connection; trying again";
+        const again = () => own === source && listen(query);
+        if (own.readyState === EventSource.CLOSED) setTimeout(again, 2000);
+    };
 }
 
 function follow(asset) {
@@ -193,11 +210,8 @@ function follow(asset) {
     [...charts, ...innovations, ...trials].forEach((plot) => plot.destroy());
     [charts, innovations, trials] = [[], [], []];
     ["charts", "innovations", "trials"].forEach((id) => byId(id).replaceChildren());
-    const query = asking({ asset, with: "innovations" });
-    source = new EventSource("events?" + query);
-    source.onmessage = (event) => take(JSON.parse(event.data));
-    source.addEventListener("innovations", source.onmessage);
-    source.onerror = () => (byId("status").textContent = "no connection; trying again");
+    byId("tried").textContent = "";
+    listen(asking({ asset, with: "innovations" }));
 }
 
 const choice = byId("asset");

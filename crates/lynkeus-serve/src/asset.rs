@@ -3,16 +3,18 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lynkeus::explain;
 use lynkeus::run::filter::{Innovation, Reading};
-use lynkeus::run::{Late, Revised, is_of_row};
+use lynkeus::run::{Handover, Late, Revised, is_of_row};
 use lynkeus::stream::Stream;
+use lynkeus::study::Screen;
 use lynkeus::table::Instant;
+use lynkeus::{Error, explain};
 
 use crate::bytes::{Parser, Writer};
 use crate::consistency::Consistency;
+use crate::handover;
 use crate::row::Stamp;
-use crate::sensor::{Sensor, Steps, is_plausible};
+use crate::sensor::{Sensor, Steps};
 
 /// A row so many usual steps after the one before says that the clock went on, or that nobody sent any.
 const JUMP: f64 = 100.0;
@@ -58,6 +60,8 @@ struct Published {
 #[derive(Clone, Debug)]
 pub(crate) struct Asset {
     stream: Arc<Stream>,
+    /// a screen of a sensor looks at the readings before
+    looks_back: bool,
     /// its first row, once there is one
     first: Vec<f64>,
     late: Option<Late>,
@@ -69,25 +73,36 @@ pub(crate) struct Asset {
     consistencies: Vec<Consistency>,
     /// by sensor
     sensors: Vec<Sensor>,
+    /// the same before the rows that may still be joined by others
+    before: Vec<Sensor>,
+    /// so many rows that were told are older than these
+    settled: usize,
     /// of rows
     steps: Steps,
     /// up to this row of all it is what a state says
     since: u64,
+    /// by channel, where it stood in rows from before the study changed
+    moved: Option<Vec<Option<usize>>>,
 }
 
 impl Asset {
     /// Before its first row.
     pub fn new(stream: Arc<Stream>) -> Self {
         let sensors = stream.channels.iter().filter(|c| c.is_sensor).count();
+        let mut screens = stream.channels.iter().flat_map(|channel| &channel.screens);
         Self {
+            looks_back: screens.any(|screen| !matches!(screen, Screen::Plausible(..))),
             first: vec![],
             late: None,
             origin: None,
             published: VecDeque::new(),
             consistencies: vec![Consistency::default(); sensors],
             sensors: vec![Sensor::default(); sensors],
+            before: vec![Sensor::default(); sensors],
+            settled: 0,
             steps: Steps::default(),
             since: 0,
+            moved: None,
             stream,
         }
     }
@@ -127,18 +142,21 @@ impl Asset {
         let newest = self.newest();
         let is_new = newest.is_none_or(|newest| t > newest);
         // what fails changes nothing
-        let mut sensors = self.sensors.clone();
-        let readings = self.screened(&mut sensors, t, values, is_new);
-        match &mut self.late {
-            Some(late) => {
-                late.push(t, &readings).map_err(said)?;
+        let Screened { sensors, rows } = self.screened(t, values, is_new);
+        match (&mut self.late, rows.as_slice()) {
+            (Some(late), [(_, readings)]) if is_new || !self.looks_back => {
+                late.push(t, readings).map_err(said)?;
             }
-            None => {
-                let begun = self.stream.begin(&readings);
+            (Some(late), rows) => {
+                late.correct(rows).map_err(said)?;
+            }
+            (None, rows) => {
+                let readings = rows.first().map_or(values, |(_, readings)| readings);
+                let begun = self.stream.begin(readings);
                 let mut late = begun.map_err(|error| error.message().to_owned())?;
-                late.push(t, &readings).map_err(said)?;
+                late.push(t, readings).map_err(said)?;
                 self.late = Some(late);
-                self.first.clone_from(&readings);
+                self.first = readings.to_vec();
                 self.origin = match stamp {
                     Stamp::Date(instant) => Some(instant),
                     Stamp::Number(_) => None,
@@ -160,6 +178,7 @@ impl Asset {
             sequence,
         };
         let lines = self.publish(row, jumped);
+        self.settle();
         self.forget(keep);
         Ok(lines)
     }
@@ -255,19 +274,83 @@ impl Asset {
         }
     }
 
-    /// A row without what is no reading.
-    fn screened(&self, sensors: &mut [Sensor], t: f64, values: &[f64], is_new: bool) -> Vec<f64> {
+    /// A row without what is no reading, and those after it of which it changes what are readings: a screen that looks at
+    /// the one before sees the samples in their order, whenever they came.
+    fn screened(&self, t: f64, values: &[f64], is_new: bool) -> Screened {
+        if is_new {
+            let mut sensors = self.sensors.clone();
+            let readings = self.taken(&mut sensors, t, values);
+            let rows = vec![(t, readings)];
+            return Screened { sensors, rows };
+        }
+        let newest = self.newest().unwrap_or(t);
+        let is_own = |row: &Published| is_of_row(row.t, t, newest);
+        let open = self
+            .published
+            .range(self.settled.min(self.published.len())..);
+        let place = open.clone().position(|row| row.t >= t || is_own(row));
+        let (mut sensors, mut as_it_was) = (self.before.clone(), self.before.clone());
+        let mut rows = vec![];
+        let mut own = |sensors: &mut [Sensor], read: &[f64]| {
+            let readings = self.taken(sensors, t, read);
+            // what was read before at this time counts for the screens, and is there
+            let came = readings
+                .iter()
+                .zip(values)
+                .map(|(y, value)| match value.is_nan() {
+                    true if !self.looks_back => f64::NAN,
+                    _ => *y,
+                });
+            rows.push((t, came.collect::<Vec<f64>>()));
+        };
+        let mut changed = vec![];
+        for (i, row) in open.enumerate() {
+            let is_joined = is_own(row);
+            if Some(i) == place && !is_joined {
+                own(&mut sensors, values);
+            }
+            let was = self.taken(&mut as_it_was, row.t, &row.read);
+            if is_joined {
+                let mut read = row.read.clone();
+                join(&mut read, values);
+                own(&mut sensors, &read);
+                continue;
+            }
+            let is = self.taken(&mut sensors, row.t, &row.read);
+            if bits(&is) != bits(&was) {
+                changed.push((row.t, is));
+            }
+        }
+        if place.is_none() {
+            own(&mut sensors, values);
+        }
+        rows.append(&mut changed);
+        Screened { sensors, rows }
+    }
+
+    /// The readings of a row after those that some sensors have seen; NaN where there is none.
+    fn taken(&self, sensors: &mut [Sensor], t: f64, values: &[f64]) -> Vec<f64> {
         let mut readings = values.to_vec();
-        let channels = self.stream.channels.iter();
-        for ((y, channel), sensor) in readings.iter_mut().zip(channels).zip(sensors) {
-            let passes = |y: f64| channel.screens.iter().all(|screen| is_plausible(y, screen));
-            *y = match is_new {
-                true => sensor.take(t, *y, channel),
-                false if passes(*y) => *y,
-                false => f64::NAN,
-            };
+        let channels = self.stream.channels.iter().zip(sensors);
+        for (y, (channel, sensor)) in readings.iter_mut().zip(channels) {
+            *y = sensor.take(t, *y, channel);
         }
         readings
+    }
+
+    /// Rows that nothing can join any more are those before the others.
+    fn settle(&mut self) {
+        let newest = self.newest().unwrap_or_default();
+        let oldest = newest - self.stream.wait();
+        let mut before = std::mem::take(&mut self.before);
+        while let Some(row) = self.published.get(self.settled)
+            && row.t < oldest
+            && !is_of_row(row.t, oldest, newest)
+        {
+            self.taken(&mut before, row.t, &row.read);
+            self.settled += 1;
+        }
+        self.before = before;
     }
 
     /// What the last push changed: the row itself, and those after it.
@@ -429,16 +512,23 @@ impl Asset {
         };
         while self.published.len() > 1 && self.published.front().is_some_and(is_old) {
             self.published.pop_front();
+            self.settled = self.settled.saturating_sub(1);
         }
     }
 
     /// Everything that the future depends on.
     pub fn save(&self, to: &mut Writer) {
+        let channels = self.stream.channels.iter();
+        to.texts(channels.map(|channel| channel.name.as_str()));
+        let told = self.told();
+        to.texts(told.iter().map(String::as_str));
+        to.numbers(&self.stream.seconds.map_or(vec![], |seconds| vec![seconds]));
         to.numbers(&self.first);
         let Some(late) = &self.late else {
             return;
         };
         to.bytes(&late.snapshot());
+        handover::save(&late.handover(), to);
         to.word(u64::from(self.origin.is_some()));
         if let Some(origin) = self.origin {
             Stamp::Date(origin).save(to);
@@ -453,29 +543,182 @@ impl Asset {
             to.word(row.revision);
             to.word(row.sequence);
         }
+        to.word(self.sensors.len() as u64);
+        self.sensors
+            .iter()
+            .chain(&self.before)
+            .for_each(|s| s.save(to));
+        to.word(self.settled as u64);
         self.consistencies.iter().for_each(|c| c.save(to));
-        self.sensors.iter().for_each(|s| s.save(to));
         self.steps.save(to);
     }
 
-    /// To where it was after so many rows of all; none where that is no state of it.
-    pub fn load(&mut self, from: &mut Parser<'_>, sequence: u64) -> Option<()> {
+    /// What a line has, with the units.
+    fn told(&self) -> Vec<String> {
+        let estimates = self.stream.estimates.iter();
+        let estimates = estimates.map(|told| match &told.unit {
+            Some(unit) => format!("{} in {unit}", told.name),
+            None => told.name.clone(),
+        });
+        let monitors = self.stream.monitors.iter();
+        estimates
+            .chain(monitors.map(|m| m.header.clone()))
+            .collect()
+    }
+
+    /// To where an asset of this study was after so many rows of all; none where that is no state of it.
+    pub fn resume(&mut self, saved: Saved, sequence: u64) -> Option<()> {
         self.since = sequence;
-        self.first = from.numbers()?;
-        if self.first.is_empty() {
+        self.first = saved.first;
+        let Some(begun) = saved.begun else {
             return Some(());
+        };
+        if begun.sensors.len() != self.sensors.len() {
+            return None;
         }
         let mut late = self.stream.begin(&self.first).ok()?;
-        late.restore(from.bytes()?).ok()?;
+        late.restore(&begun.snapshot).ok()?;
         self.late = Some(late);
-        if from.word()? == 1 {
-            let Stamp::Date(origin) = Stamp::load(from)? else {
-                return None;
-            };
-            self.origin = Some(origin);
+        self.origin = begun.origin;
+        self.published = begun.published.into();
+        self.consistencies = begun.consistencies;
+        (self.sensors, self.before) = (begun.sensors, begun.before);
+        self.settled = begun.settled;
+        self.steps = begun.steps;
+        Some(())
+    }
+
+    /// To where an asset of a study with other numbers was after so many rows of all: estimates and what is known of their
+    /// errors go on, and what is known of sensors; whether the estimate is credible is judged anew.
+    ///
+    /// # Errors
+    /// Why that is impossible.
+    pub fn take_over(&mut self, saved: Saved, sequence: u64) -> Result<(), Error> {
+        let other = |text: String| Err(Error::input(text));
+        if self.stream.seconds != saved.seconds {
+            return other("the plant's unit of time is another one".to_owned());
         }
+        let told = self.told();
+        let estimates = told.len() - self.stream.monitors.len();
+        let is_told = |name: &&String| saved.told.contains(name);
+        if let Some(name) = told.iter().take(estimates).find(|name| !is_told(name)) {
+            return other(format!(
+                "this study estimates {name}, and there are {}",
+                saved.told.join(", ")
+            ));
+        }
+        let names = self.stream.channels.iter();
+        let places = names.map(|channel| saved.channels.iter().position(|c| *c == channel.name));
+        let places: Vec<Option<usize>> = places.collect();
+        self.since = sequence;
+        self.moved = Some(places);
+        let Some(begun) = saved.begun else {
+            return Ok(());
+        };
+        self.first = self.at_places(&saved.first);
+        self.late = Some(self.stream.take_over(&self.first, &begun.handover)?);
+        self.origin = begun.origin;
+        let estimates = self.stream.estimates.iter();
+        let lacks = estimates.filter(|told| told.deviation.is_some()).count() > 0
+            && begun.published.iter().any(|row| row.deviations.is_empty());
+        if told == saved.told && !lacks {
+            let rows = begun.published.into_iter().map(|row| Published {
+                read: self.at_places(&row.read),
+                ..row
+            });
+            self.published = rows.collect();
+            self.settled = begun.settled;
+        }
+        // of rows that are not known any more nothing is taken back
+        let before = if self.published.is_empty() {
+            &begun.sensors
+        } else {
+            &begun.before
+        };
+        let places = self.moved.iter().flatten();
+        let sensors = self.sensors.iter_mut().zip(&mut self.before);
+        for ((own, own_before), place) in sensors.zip(places) {
+            let Some(place) = *place else { continue };
+            if let (Some(sensor), Some(before)) = (begun.sensors.get(place), before.get(place)) {
+                (*own, *own_before) = (sensor.clone(), before.clone());
+            }
+        }
+        self.steps = begun.steps;
+        Ok(())
+    }
+
+    /// The values of a row that was written down before the study changed.
+    pub fn at_places(&self, values: &[f64]) -> Vec<f64> {
+        let Some(moved) = &self.moved else {
+            return values.to_vec();
+        };
+        let value = |place: &Option<usize>| place.and_then(|place| values.get(place)).copied();
+        moved
+            .iter()
+            .map(|place| value(place).unwrap_or(f64::NAN))
+            .collect()
+    }
+}
+
+/// What a state says of an asset.
+#[derive(Debug)]
+pub(crate) struct Saved {
+    channels: Vec<String>,
+    told: Vec<String>,
+    seconds: Option<f64>,
+    first: Vec<f64>,
+    /// none before its first row
+    begun: Option<Begun>,
+}
+
+/// What it says of one that had a row.
+#[derive(Debug)]
+struct Begun {
+    snapshot: Vec<u8>,
+    handover: Handover,
+    origin: Option<Instant>,
+    published: Vec<Published>,
+    sensors: Vec<Sensor>,
+    before: Vec<Sensor>,
+    settled: usize,
+    consistencies: Vec<Consistency>,
+    steps: Steps,
+}
+
+impl Saved {
+    /// What was [saved](Asset::save); none where that is something else.
+    pub fn load(from: &mut Parser<'_>) -> Option<Self> {
+        let (channels, told) = (from.texts()?, from.texts()?);
+        let seconds = from.numbers()?.first().copied();
+        let first = from.numbers()?;
+        let begun = match first.is_empty() {
+            true => None,
+            false => Some(Begun::load(from)?),
+        };
+        Some(Self {
+            channels,
+            told,
+            seconds,
+            first,
+            begun,
+        })
+    }
+}
+
+impl Begun {
+    fn load(from: &mut Parser<'_>) -> Option<Self> {
+        let snapshot = from.bytes()?.to_vec();
+        let handover = handover::load(from)?;
+        let origin = match from.word()? {
+            1 => match Stamp::load(from)? {
+                Stamp::Date(origin) => Some(origin),
+                Stamp::Number(_) => return None,
+            },
+            _ => None,
+        };
+        let mut published = vec![];
         for _ in 0..from.count(56)? {
-            self.published.push_back(Published {
+            published.push(Published {
                 t: from.number()?,
                 stamp: Stamp::load(from)?,
                 read: from.numbers()?,
@@ -485,15 +728,33 @@ impl Asset {
                 sequence: from.word()?,
             });
         }
-        for consistency in &mut self.consistencies {
-            *consistency = Consistency::load(from)?;
-        }
-        for sensor in &mut self.sensors {
-            *sensor = Sensor::load(from)?;
-        }
-        self.steps = Steps::load(from)?;
-        Some(())
+        let count = from.count(64)?;
+        let sensors = (0..count).map(|_| Sensor::load(from));
+        let sensors = sensors.collect::<Option<_>>()?;
+        let before = (0..count).map(|_| Sensor::load(from));
+        let before = before.collect::<Option<_>>()?;
+        let settled = usize::try_from(from.word()?).ok()?;
+        let consistencies = (0..count).map(|_| Consistency::load(from));
+        Some(Self {
+            snapshot,
+            handover,
+            origin,
+            published,
+            sensors,
+            before,
+            settled,
+            consistencies: consistencies.collect::<Option<_>>()?,
+            steps: Steps::load(from)?,
+        })
     }
+}
+
+/// Rows without what is no reading.
+struct Screened {
+    /// after them
+    sensors: Vec<Sensor>,
+    /// the row that came, then those of which other readings count
+    rows: Vec<(f64, Vec<f64>)>,
 }
 
 /// What speaks against an estimate.

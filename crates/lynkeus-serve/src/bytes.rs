@@ -20,6 +20,11 @@ impl Writer {
         self.0.extend_from_slice(bytes);
     }
 
+    pub fn texts<'t>(&mut self, texts: impl ExactSizeIterator<Item = &'t str>) {
+        self.word(texts.len() as u64);
+        texts.for_each(|text| self.bytes(text.as_bytes()));
+    }
+
     pub fn numbers(&mut self, numbers: &[f64]) {
         self.word(numbers.len() as u64);
         numbers.iter().for_each(|x| self.number(*x));
@@ -56,6 +61,11 @@ impl<'b> Parser<'b> {
 
     pub fn text(&mut self) -> Option<String> {
         String::from_utf8(self.bytes()?.to_vec()).ok()
+    }
+
+    pub fn texts(&mut self) -> Option<Vec<String>> {
+        let count = self.count(8)?;
+        (0..count).map(|_| self.text()).collect()
     }
 
     pub fn numbers(&mut self) -> Option<Vec<f64>> {

@@ -1,5 +1,8 @@
 //! Rows of many assets to their estimators: kept first, then taken, then answered.
 
+#[cfg(test)]
+mod day;
+
 use std::collections::HashMap;
 use std::num::NonZero;
 use std::path::Path;
@@ -10,7 +13,7 @@ use std::time::{Duration, Instant};
 use lynkeus::Error;
 use lynkeus::stream::Stream;
 
-use crate::asset::{Asset, Line};
+use crate::asset::{Asset, Line, Saved};
 use crate::bytes::{Parser, Writer};
 use crate::history::{History, now};
 use crate::json::{ASSET, Message};
@@ -45,6 +48,10 @@ pub struct Engine {
     assets: Vec<Asset>,
     names: Vec<String>,
     places: HashMap<String, usize>,
+    /// by place in the state, where an asset is now; none where nobody is called so any more
+    moved: Vec<Option<usize>>,
+    /// assets whose study has changed since the state
+    changed: Vec<usize>,
     /// rows so far
     sequence: u64,
     threads: usize,
@@ -93,6 +100,8 @@ impl Engine {
                 .into_iter()
                 .map(|(_, stream)| Asset::new(stream))
                 .collect(),
+            moved: vec![],
+            changed: vec![],
             sequence: 0,
             threads: thread::available_parallelism().map_or(1, NonZero::get),
             state: None,
@@ -113,10 +122,11 @@ impl Engine {
     }
 
     /// Goes on where this file says that it was, and keeps what it is given there from here on. A file that is not
-    /// there is made.
+    /// there is made. Where the study has other numbers than that of the file, what it has in common with it is taken
+    /// over, and the file before is kept beside.
     ///
     /// # Errors
-    /// Another program has it, it cannot be read or written, it is none, or one of another study.
+    /// Another program has it, it cannot be read or written, it is none, or one of another plant or observer.
     pub fn keep(&mut self, path: &Path) -> Result<(), Error> {
         let (state, bytes) = State::open(path)?;
         if let Some(history) = &mut self.history {
@@ -140,9 +150,18 @@ impl Engine {
             let text = format!("went on after row {} of {}", self.sequence, path.display());
             self.notes.push(text);
         }
+        if !self.changed.is_empty() {
+            self.notes.push(self.told_changes());
+        }
+        if !self.changed.is_empty() || self.moved.contains(&None) {
+            let aside = state.set_aside();
+            let aside = aside.map_err(|error| State::unusable(path, &error))?;
+            self.notes
+                .push(format!("the state before is {}", aside.display()));
+        }
         self.state = Some(state);
         if let Some(history) = &mut self.history {
-            history.is_up_to_date();
+            history.is_up_to_date().map_err(|error| unwritten(&error))?;
         }
         self.renew_all()
             .map_err(|error| State::unusable(path, &error))
@@ -172,26 +191,49 @@ impl Engine {
         let Some((name, fingerprint, sequence)) = head(&mut from) else {
             return Ok(None);
         };
-        let Some(asset) = self.place(&name).and_then(|i| self.assets.get_mut(i)) else {
+        let place = self.place(&name);
+        self.moved.push(place);
+        let Some((place, asset)) = place.and_then(|i| Some((i, self.assets.get_mut(i)?))) else {
             let text =
                 format!("the state of \"{name}\" is left out: no asset is called so any more");
             self.notes.push(text);
             return Ok(Some(()));
         };
-        if asset.fingerprint() != fingerprint {
-            let of = if name.is_empty() {
-                String::new()
-            } else {
-                format!(" of \"{name}\"")
-            };
-            let message = format!(
-                "this is the state{of} of another study: its plant, its observer, its numbers or the names of its columns differ"
-            );
-            return Err(Error::input(message)
-                .at(path.display())
-                .hint("go back to the study that made it, or move the file away and start again"));
+        let Some(saved) = Saved::load(&mut from) else {
+            return Ok(None);
+        };
+        if asset.fingerprint() == fingerprint {
+            return Ok(asset.resume(saved, sequence));
         }
-        Ok(asset.load(&mut from, sequence))
+        self.changed.push(place);
+        asset.take_over(saved, sequence).map_err(|error| {
+            let of = match name.is_empty() {
+                true => String::new(),
+                false => format!(" of \"{name}\""),
+            };
+            let why = error.message();
+            let text =
+                format!("the study has changed, and the state{of} cannot be taken over: {why}");
+            let hint =
+                "go back to the study that made it, or move the file away to begin from the start";
+            Error::input(text).at(path.display()).hint(hint)
+        })?;
+        Ok(Some(()))
+    }
+
+    /// What became of a state of another study.
+    fn told_changes(&self) -> String {
+        let of = match self.has_names() {
+            true => format!(" of {} of {} assets", self.changed.len(), self.assets.len()),
+            false => String::new(),
+        };
+        let first = self.changed.first().and_then(|place| self.stream(*place));
+        let estimates = first.map_or(&[][..], |stream| &stream.estimates);
+        let names: Vec<&str> = estimates.iter().map(|told| told.name.as_str()).collect();
+        format!(
+            "the study has changed: the estimates{of} ({}) and what is known of their errors are taken over, new rows alone say whether they are credible",
+            names.join(", ")
+        )
     }
 
     /// What a snapshot says of everything else.
@@ -204,7 +246,7 @@ impl Engine {
         match &mut self.history {
             // there was no history so far
             Some(_) if from.0.is_empty() => {}
-            Some(history) => match history.load(&mut from, sequence) {
+            Some(history) => match history.load(&mut from, sequence, !self.changed.is_empty()) {
                 None => return Ok(None),
                 Some(done) => done.map_err(|error| unwritten(&error))?,
             },
@@ -221,10 +263,15 @@ impl Engine {
         let came = i128::from(from.word()? as i64);
         let mut rows = vec![];
         for _ in 0..from.count(32)? {
+            let place = usize::try_from(from.word()?).ok()?;
+            let (stamp, values) = (Stamp::load(&mut from)?, from.numbers()?);
+            // assets may have come and gone since
+            let place = self.moved.get(place).copied().flatten();
+            let asset = place.and_then(|place| self.assets.get(place));
             rows.push(Arrival {
-                asset: usize::try_from(from.word()?).ok()?,
-                stamp: Stamp::load(&mut from)?,
-                values: from.numbers()?,
+                asset: place.unwrap_or(usize::MAX),
+                stamp,
+                values: asset.map_or(vec![], |asset| asset.at_places(&values)),
             });
         }
         self.apply(&rows, came);
@@ -404,17 +451,21 @@ impl Engine {
 
     /// Takes rows in their order, at most `BATCH`, and keeps them before they are answered.
     pub fn take(&mut self, rows: &[Arrival]) -> Vec<Answer> {
+        self.take_at(rows, now())
+    }
+
+    /// The same of rows that came at a time, in nanoseconds since 1970.
+    fn take_at(&mut self, rows: &[Arrival], came: i128) -> Vec<Answer> {
         if rows.is_empty() {
             return vec![];
         }
-        let came = now();
         match self.write_down(rows, came) {
             Ok(()) => {}
             Err(why) if rows.len() == 1 => return vec![Err(Refusal::NotKept(why))],
             // there may be room for some of them
             Err(_) => {
                 let (some, others) = rows.split_at(rows.len() / 2);
-                return [self.take(some), self.take(others)].concat();
+                return [self.take_at(some, came), self.take_at(others, came)].concat();
             }
         }
         let answers = self.apply(rows, came);

@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -39,8 +39,10 @@ pub(crate) struct History {
     length: u64,
     /// what is not in the file so far
     pending: String,
-    /// the rows of the state are gone over again: files of later days are written anew
+    /// the rows of the state are gone over again: their lines are written over themselves
     is_repeating: bool,
+    /// another study goes over them: what the one before made of them goes
+    is_changed: bool,
     /// the lines up to this row are there
     since: u64,
     /// days are to become Parquet
@@ -82,6 +84,7 @@ impl History {
             length: 0,
             pending: String::new(),
             is_repeating: false,
+            is_changed: false,
             since: 0,
             is_parquet: pattern
                 .extension()
@@ -172,9 +175,15 @@ impl History {
         if let Some(keep) = self.keep {
             let oldest = day - i128::from(keep);
             for old in oldest - LONG_AGO..oldest {
+                let path = self.path(old);
                 // most of them are not there
-                let _ = std::fs::remove_file(self.path(old));
                 let _ = std::fs::remove_file(self.draft(old));
+                let _ = std::fs::remove_file(&path);
+                let mut others = others(&path);
+                while others
+                    .next()
+                    .is_some_and(|other| std::fs::remove_file(other).is_ok())
+                {}
             }
         }
     }
@@ -227,17 +236,50 @@ impl History {
             }
             Err(error) => {
                 // where this fails it is written over
-                let _ = file.set_len(self.length);
+                if !self.is_repeating {
+                    let _ = file.set_len(self.length);
+                }
                 Err(error)
             }
         }
     }
 
+    /// A file of the day with other columns, as another study wrote them, is left beside the new one.
+    fn leave_others(&self) -> io::Result<()> {
+        let (draft, path) = (self.draft(self.day), self.path(self.day));
+        let mut first = String::new();
+        match File::open(&draft) {
+            Ok(file) => BufReader::new(file).read_line(&mut first)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        if first.is_empty() || first == self.header {
+            return Ok(());
+        }
+        let Some(other) = others(&path).find(|other| !other.exists()) else {
+            return Ok(());
+        };
+        match self.is_parquet {
+            false => std::fs::rename(draft, other),
+            true => {
+                parquet::convert(&draft, &other)?;
+                std::fs::remove_file(draft)
+            }
+        }
+    }
+
     fn open(&mut self) -> io::Result<()> {
+        if !self.is_repeating {
+            self.leave_others()?;
+        }
         let mut options = OpenOptions::new();
-        options.write(true).create(true).truncate(self.is_repeating);
+        let is_anew = self.is_repeating && self.is_changed;
+        options.write(true).create(true).truncate(is_anew);
         let file = options.open(self.draft(self.day))?;
-        self.length = file.metadata()?.len();
+        self.length = match self.is_repeating {
+            true => 0,
+            false => file.metadata()?.len(),
+        };
         self.file = Some(file);
         Ok(())
     }
@@ -266,48 +308,82 @@ impl History {
         self.open()
     }
 
-    /// Goes back to where it was: the rows since will be told once more.
-    pub fn load(&mut self, from: &mut Parser<'_>, sequence: u64) -> Option<io::Result<()>> {
+    /// Goes back to where it was: the rows since will be told once more, by another study where it has changed. What
+    /// follows after them is left, as it is of rows that this state does not know: somebody put back an older one.
+    pub fn load(
+        &mut self,
+        from: &mut Parser<'_>,
+        sequence: u64,
+        is_changed: bool,
+    ) -> Option<io::Result<()>> {
         self.since = sequence;
         let (day, length) = (i128::from(from.word()? as i64), from.word()?);
-        self.is_repeating = true;
+        (self.is_repeating, self.is_changed) = (true, is_changed);
         self.day = day;
-        let file = OpenOptions::new().write(true).open(self.draft(day));
-        Some(match file {
-            Ok(file) => self.shorten(file, length),
-            // somebody took it away
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            Err(error) => Err(error),
-        })
+        Some(self.go_back(length))
     }
 
-    fn shorten(&mut self, file: File, length: u64) -> io::Result<()> {
+    fn go_back(&mut self, length: u64) -> io::Result<()> {
+        let mut options = OpenOptions::new();
+        let file = match options.write(true).open(self.draft(self.day)) {
+            Ok(file) => file,
+            // somebody took it away
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        let length = file.metadata()?.len().min(length);
+        if self.is_changed {
+            file.set_len(length)?;
+        }
+        self.leave_others()?;
+        let file = options.create(true).truncate(false);
+        let file = file.open(self.draft(self.day))?;
         self.length = file.metadata()?.len().min(length);
-        file.set_len(self.length)?;
         self.file = Some(file);
         Ok(())
     }
 
     /// All rows of the state were told.
-    pub fn is_up_to_date(&mut self) {
+    ///
+    /// # Errors
+    /// The file cannot be looked at.
+    pub fn is_up_to_date(&mut self) -> io::Result<()> {
         self.is_repeating = false;
+        if let Some(file) = &self.file {
+            self.length = self.length.max(file.metadata()?.len());
+        }
+        Ok(())
     }
+
+    /// Leaves its files as a kill does after the thread is done.
+    #[cfg(test)]
+    pub fn kill(&mut self) {
+        if let Some(worker) = self.worker.take() {
+            let _ = worker.join();
+        }
+    }
+}
+
+/// More files of the day that a file is of.
+fn others(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    let ending = ending.into_owned();
+    (2..).map(move |count: u32| path.with_extension(format!("{count}.{ending}")))
 }
 
 /// A day as Parquet, in the place of its CSV file.
 fn close(draft: &Path, path: &Path) -> io::Result<()> {
-    let mut to = path.to_owned();
     if draft.metadata()?.len() == 0 {
         return std::fs::remove_file(draft);
     }
+    let mut to = path.to_owned();
     if path.exists() {
-        if parquet::rows(path)? == parquet::lines(draft)? {
+        if parquet::is_of(path, draft)? {
             // a kill came between the two files
             return std::fs::remove_file(draft);
         }
-        // the clock went back to a day that was over: nothing is written over
-        let mut others = (2..).map(|count: u32| path.with_extension(format!("{count}.parquet")));
-        to = others.find(|other| !other.exists()).unwrap_or(to);
+        // the clock went back to a day that was over, or the study changed: nothing is written over
+        to = others(path).find(|other| !other.exists()).unwrap_or(to);
     }
     parquet::convert(draft, &to)?;
     std::fs::remove_file(draft)
@@ -475,9 +551,18 @@ mod tests {
         let text = std::fs::read(&draft).unwrap();
         history.is_over(20_001);
         wait(&mut history);
-        std::fs::write(&draft, text).unwrap();
+        std::fs::write(&draft, &text).unwrap();
         history.is_over(20_001);
         wait(&mut history);
         assert_eq!(files(folder.path()), ["h-2024-10-04.parquet"]);
+        // as many lines, and others
+        let other = String::from_utf8(text).unwrap().replace(",2\n", ",3\n");
+        std::fs::write(&draft, other).unwrap();
+        history.is_over(20_001);
+        wait(&mut history);
+        assert_eq!(
+            files(folder.path()),
+            ["h-2024-10-04.2.parquet", "h-2024-10-04.parquet"]
+        );
     }
 }

@@ -15,6 +15,7 @@ mod board;
 mod bytes;
 mod consistency;
 mod engine;
+mod handover;
 mod history;
 pub mod http;
 pub mod influx;

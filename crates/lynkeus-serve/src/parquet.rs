@@ -13,6 +13,7 @@ use ::parquet::errors::ParquetError;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use ::parquet::record::Field;
 use ::parquet::schema::types::Type;
 use lynkeus::table::Instant;
 
@@ -53,37 +54,53 @@ pub(crate) fn convert(from: &Path, to: &Path) -> io::Result<()> {
     done
 }
 
-/// How many rows a file has.
-pub(crate) fn rows(path: &Path) -> io::Result<u64> {
+/// Whether a file holds the lines of a CSV file, each number to the bit.
+///
+/// # Errors
+/// One of them cannot be read, or the disk is full.
+pub(crate) fn is_of(path: &Path, from: &Path) -> io::Result<bool> {
     let reader = SerializedFileReader::new(File::open(path)?).map_err(io::Error::other)?;
-    let rows = reader.metadata().file_metadata().num_rows();
-    Ok(u64::try_from(rows).unwrap_or(0))
+    let mut lines = csv::Reader::from_path(from)?;
+    let names = lines.headers()?.clone();
+    let schema = reader.metadata().file_metadata().schema();
+    let columns = schema.get_fields().iter().map(|field| field.name());
+    if !columns.eq(&names) {
+        return Ok(false);
+    }
+    let kinds = kinds(from, &names)?;
+    let mut records = lines.records();
+    for row in reader.get_row_iter(None).map_err(io::Error::other)? {
+        let row = row.map_err(io::Error::other)?;
+        let Some(record) = records.next().transpose()? else {
+            return Ok(false);
+        };
+        let cells = record.iter().zip(&kinds);
+        let mut pairs = row.get_column_iter().map(|(_, field)| field).zip(cells);
+        if !pairs.all(|(field, (cell, kind))| is_in(field, cell, *kind)) {
+            return Ok(false);
+        }
+    }
+    Ok(records.next().is_none())
 }
 
-/// How many lines after its header a CSV file has that are whole.
-pub(crate) fn lines(path: &Path) -> io::Result<u64> {
-    let mut reader = csv::Reader::from_path(path)?;
-    let mut record = csv::StringRecord::new();
-    let mut count = 0;
-    while reader.read_record(&mut record)? {
-        count += 1;
+/// Whether a field holds what a cell says.
+fn is_in(field: &Field, cell: &str, kind: Kind) -> bool {
+    let number = |cell: &str| cell.parse::<f64>().ok().map(f64::to_bits);
+    match (kind, field) {
+        (Kind::Number, Field::Double(x)) => number(cell) == Some(x.to_bits()),
+        (Kind::Number, Field::Null) => number(cell).is_none(),
+        (Kind::Date { .. }, Field::Long(t)) => date(cell).is_some_and(|(own, _)| own == *t),
+        (Kind::Text, Field::Str(text)) => text == cell,
+        (Kind::Truth, Field::Bool(truth)) => cell.parse() == Ok(*truth),
+        (Kind::Count, Field::Long(count)) => cell.parse() == Ok(*count),
+        _ => false,
     }
-    Ok(count)
 }
 
 fn written(from: &Path, to: &Path) -> io::Result<()> {
     let mut reader = csv::Reader::from_path(from)?;
     let names = reader.headers()?.clone();
-    let time = time(from)?;
-    let last = names.len().saturating_sub(2);
-    let kinds = names.iter().enumerate().map(|(place, name)| match name {
-        _ if place == 0 => time,
-        ASSET if place == 1 => Kind::Text,
-        CREDIBLE if place >= last => Kind::Truth,
-        REVISION if place >= last => Kind::Count,
-        _ => Kind::Number,
-    });
-    let kinds: Vec<Kind> = kinds.collect();
+    let kinds = kinds(from, &names)?;
     let file = File::create(to)?;
     let mut writer = writer(&file, &names, &kinds).map_err(io::Error::other)?;
     let mut records = reader.records();
@@ -104,6 +121,20 @@ fn written(from: &Path, to: &Path) -> io::Result<()> {
     }
     writer.close().map_err(io::Error::other)?;
     file.sync_all()
+}
+
+/// What the columns of a file hold.
+fn kinds(from: &Path, names: &csv::StringRecord) -> io::Result<Vec<Kind>> {
+    let time = time(from)?;
+    let last = names.len().saturating_sub(2);
+    let kinds = names.iter().enumerate().map(|(place, name)| match name {
+        _ if place == 0 => time,
+        ASSET if place == 1 => Kind::Text,
+        CREDIBLE if place >= last => Kind::Truth,
+        REVISION if place >= last => Kind::Count,
+        _ => Kind::Number,
+    });
+    Ok(kinds.collect())
 }
 
 /// What the times of a file are: numbers, dates of one kind, or texts where they differ.

@@ -109,7 +109,7 @@ impl Sensor {
             let is_none = match *screen {
                 Screen::Repeats => last.1 > 1,
                 Screen::Frozen(most) => last.1 > most,
-                Screen::Plausible(..) => !is_plausible(y, screen),
+                Screen::Plausible(low, high) => !(low..=high).contains(&y),
             };
             if is_none {
                 y = f64::NAN;
@@ -164,14 +164,6 @@ impl Sensor {
                 read.collect::<Option<_>>()?
             },
         })
-    }
-}
-
-/// Whether a screen lets a reading pass that comes late, by itself.
-pub(crate) fn is_plausible(y: f64, screen: &Screen) -> bool {
-    match *screen {
-        Screen::Plausible(low, high) => (low..=high).contains(&y),
-        Screen::Repeats | Screen::Frozen(_) => true,
     }
 }
 

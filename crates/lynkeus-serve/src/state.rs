@@ -12,10 +12,12 @@ use std::thread::{self, JoinHandle};
 
 use lynkeus::Error;
 use lynkeus::run::Digest;
+use lynkeus::table::Instant;
 
 use crate::bytes::{Parser, beside};
+use crate::history::now;
 
-const MAGIC: &[u8; 8] = b"LYNKSRV2";
+const MAGIC: &[u8; 8] = b"LYNKSRV3";
 /// Length, kind and checksum before each record.
 const HEAD: usize = 24;
 /// Rows since the snapshot take at least so many bytes before it is written anew.
@@ -152,6 +154,22 @@ impl State {
         }
     }
 
+    /// Leaves the file as it is under another name, which has the time; the name.
+    ///
+    /// # Errors
+    /// The disk is full, or failed.
+    pub fn set_aside(&self) -> io::Result<PathBuf> {
+        let time = Instant::at(now(), true).to_string();
+        let time = time.split('.').next().unwrap_or_default();
+        let time = time.trim_end_matches('Z').replace(':', "-");
+        let aside = beside(&self.path, &format!(".{time}"));
+        // it is written anew beside itself: another name is enough where a file may have two
+        if std::fs::hard_link(&self.path, &aside).is_err() {
+            std::fs::copy(&self.path, &aside)?;
+        }
+        Ok(aside)
+    }
+
     /// Whether it is time to write it anew.
     pub fn is_due(&self) -> bool {
         self.length >= self.due && self.renewal.is_none()
@@ -244,6 +262,15 @@ impl State {
                 let _ = std::fs::remove_file(&new);
                 Err(error)
             }
+        }
+    }
+
+    /// Leaves it as a kill does.
+    #[cfg(test)]
+    pub fn kill(mut self) {
+        if let Some(Renewal { to, worker, .. }) = self.renewal.take() {
+            drop(to);
+            let _ = worker.join();
         }
     }
 

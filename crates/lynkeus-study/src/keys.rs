@@ -3,6 +3,8 @@
 
 mod judged;
 
+use std::ops::RangeInclusive;
+
 use lynkeus_observers::{KeySpec, REQUIRED, Shape};
 use lynkeus_run::Tolerances;
 
@@ -703,6 +705,9 @@ pub(super) const SERVE: [KeySpec; 9] = [
     },
 ];
 
+/// Seconds between what a server of OPC UA sends.
+pub(super) const INTERVALS: RangeInclusive<f64> = 0.01..=3600.0;
+
 /// `opcua` in `[serve]`
 pub(super) const OPCUA: [KeySpec; 8] = [
     KeySpec {
@@ -725,7 +730,10 @@ pub(super) const OPCUA: [KeySpec; 8] = [
     },
     KeySpec {
         name: "interval",
-        shape: Shape::Positive,
+        shape: Shape::Between {
+            least: *INTERVALS.start(),
+            most: *INTERVALS.end(),
+        },
         default: "0.5",
         meaning: "seconds between what the server sends; every change in between is in it",
     },
@@ -836,13 +844,7 @@ pub(super) const MQTT: [KeySpec; 14] = [
     },
     KeySpec {
         name: "qos",
-        shape: Shape::As(
-            "0, 1",
-            &Shape::Between {
-                least: 0.0,
-                most: 1.0,
-            },
-        ),
+        shape: Shape::OneOf(&[0, 1]),
         default: "1",
         meaning: "whether messages are acknowledged, and sent again until they are (1), or not (0)",
     },

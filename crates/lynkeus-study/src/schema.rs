@@ -123,6 +123,7 @@ fn shape(shape: &Shape) -> Value {
         Shape::Between { least, most } => {
             json!({ "type": "number", "minimum": least, "maximum": most })
         }
+        Shape::OneOf(numbers) => json!({ "type": "integer", "enum": numbers }),
         Shape::Whole(least) => json!({ "type": "integer", "minimum": least }),
         Shape::Flag => json!({ "type": "boolean" }),
         Shape::Text => json!({ "type": "string" }),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Name;
-use super::keys::{MQTT, OPCUA, SERVE};
+use super::keys::{INTERVALS, MQTT, OPCUA, SERVE};
 use super::section::Entry;
 use lynkeus_answer::Error;
 
@@ -145,7 +145,7 @@ fn opcua(entry: Entry<'_>) -> Result<OpcuaSettings, Error> {
         nodes,
         write: section.optional("write", names)?.unwrap_or_default(),
         interval: section
-            .optional("interval", Entry::positive)?
+            .optional("interval", |e| e.within(&INTERVALS))?
             .unwrap_or(0.5),
         user: section.optional("user", Entry::name)?,
         password: section.optional("password", Entry::name)?,

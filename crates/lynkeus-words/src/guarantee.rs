@@ -35,6 +35,11 @@ impl Words for Said {
                 short(*rate),
                 for_slopes(*slopes)
             ),
+            Self::HoldsTogether { rate, parts } => format!(
+                "He(P J) + 2·{}·P < 0 with the slopes as they are together at each point of the box, in {} of it, by interval Cholesky factorisation",
+                short(*rate),
+                counted(*parts, "part")
+            ),
             Self::Unstable(point) => format!(
                 "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes",
                 point.words()

@@ -2,8 +2,8 @@
 
 use lynkeus_expr::{Graph, Tape};
 use lynkeus_model::{Home, Plant, parse_expression};
-use lynkeus_run::Late;
 use lynkeus_run::credible::By;
+use lynkeus_run::{Handover, Late, Standing};
 
 use super::live::{blueprint, late};
 use crate::course::Samples;
@@ -17,6 +17,9 @@ use crate::words::explain;
 use crate::{Error, Series, Study};
 use lynkeus_study::{Name, Noise, Screen, seconds_in};
 use lynkeus_table::Pattern;
+
+/// Estimates that differ by such a share of their size are the same but for rounding.
+const SAME: f64 = 1e-6;
 
 /// What a service knows of a study: which values a row has, what is told of it, and the estimator between them.
 #[derive(Debug)]
@@ -116,7 +119,7 @@ impl Stream {
     ///
     /// # Errors
     /// As [`estimator`](crate::estimator), but for readings that come late; and what a line cannot tell: rotations, a time that is an
-    /// expression, cells that are no readings because of the ones before, where rows may come late.
+    /// expression.
     pub fn new(study: &Study) -> Result<Self, Error> {
         let mut study = study.clone();
         // what is followed for `estimate` is told here
@@ -197,6 +200,43 @@ impl Stream {
         };
         start_at_readings(&prepared, &first, &mut design);
         waiting(&prepared, design)
+    }
+
+    /// The estimator that goes on where that of another study was, whose first row was this one: states and what is known
+    /// of their errors are taken over by name, and the rows that it keeps are gone over again.
+    ///
+    /// # Errors
+    /// As [`begin`](Self::begin); it has other states, or they mean something else under these numbers.
+    pub fn take_over(&self, first: &[f64], from: &Handover) -> Result<Late, Error> {
+        let mut late = self.begin(first)?;
+        if let Some(standing) = &from.standing {
+            let mut at_once = late.clone();
+            let alone = Handover {
+                rows: vec![],
+                ..from.clone()
+            };
+            at_once.take_over(&alone).map_err(explain)?;
+            self.refuse_other_meaning(&at_once, standing)?;
+        }
+        late.take_over(from).map_err(explain)?;
+        Ok(late)
+    }
+
+    /// What an observer estimates may be a function of its states in which its numbers stand.
+    fn refuse_other_meaning(&self, late: &Late, standing: &Standing) -> Result<(), Error> {
+        let estimates = late.names().iter().zip(late.estimate());
+        for (name, x) in estimates.take(self.estimates.len()) {
+            let mut known = standing.estimates.iter();
+            let Some((_, known)) = known.find(|(known, _)| known == name) else {
+                continue;
+            };
+            if (x - known).abs() > SAME * (x.abs() + known.abs()) {
+                return Err(Error::input(format!(
+                    "the states of this observer mean something else under other numbers: with what is taken over {name} would be {x} and was {known}"
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// The channels whose first readings say where the estimate starts.
@@ -370,15 +410,5 @@ fn refuse_untold(study: &Study, plant: &Plant) -> Result<(), Error> {
         );
         return Err(time.blame(Error::input(message)));
     }
-    let looks_back = |(_, screen): &&(Name, Screen)| !matches!(screen, Screen::Plausible(..));
-    let mut screens = study.sensors.screens.iter();
-    match screens.find(looks_back).filter(|_| study.serve.wait > 0.0) {
-        None => Ok(()),
-        Some((name, _)) => Err(name.blame(
-            Error::input(format!(
-                "`repeats` and `frozen` of [sensors] look at the reading before, and with `wait` of [serve] rows of {name} may come in another order"
-            ))
-            .hint("leave out one of the two"),
-        )),
-    }
+    Ok(())
 }

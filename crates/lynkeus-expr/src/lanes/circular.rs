@@ -1,14 +1,72 @@
-//! sin, cos and tan and their inverses, after fdlibm (Sun Microsystems, 1993). Of the argument
-//! k·π/2 is taken away, then two polynomials serve on [−π/4, π/4].
+//! sin, cos and tan and their inverses. For sin and cos k·π is taken away, then one polynomial serves on
+//! [−π/2, π/2]; the others are after fdlibm (Sun Microsystems, 1993), tan with π/2.
 
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, PI};
 
 use super::Vector;
 use super::exponential::MAGIC;
 use super::vector::{horner, polynomial};
 
+/// π in three parts, the second and third with the sign of the first: 0 keeps its own sign then.
+const HALF_TURN: [f64; 3] = [PI, 1.224_646_799_147_353e-16, 2.165_713_347_843_828e-32];
+/// Up to here k has all its digits.
+const HUGE: f64 = 1e9;
+
+/// The sine of x, or the cosine, which is the sine of x + π/2, π/2 being `quarter` of π: with k·π taken away
+/// it is that of −π/2 to π/2, but for the sign where k is odd.
+#[inline(always)]
+fn wave<V: Vector>(x: V, quarter: Option<f64>, library: fn(f64, f64) -> f64) -> V {
+    let by_pi = V::splat(FRAC_1_PI);
+    let (shifted, turns) = match quarter {
+        None => {
+            let shifted = x.mul_add(by_pi, V::splat(MAGIC));
+            (shifted, shifted - V::splat(MAGIC))
+        }
+        Some(quarter) => {
+            let quarter = V::splat(quarter);
+            let shifted = x.mul_add(by_pi, quarter) + V::splat(MAGIC);
+            (shifted, (shifted - V::splat(MAGIC)) - quarter)
+        }
+    };
+    let less = |rest: V, part: f64| turns.mul_add(V::splat(-part), rest);
+    let r = HALF_TURN.into_iter().fold(x, less);
+    let (a, z) = (r.abs(), r * r);
+    // (sin √z / √z − 1)/z, within 2⁻⁶⁰ of the sine
+    let bent = polynomial(
+        z,
+        [
+            -1.666_666_666_666_666_6e-1,
+            -1.984_126_984_122_165_4e-4,
+            -2.505_210_698_017_568e-8,
+            -7.643_057_638_606_719e-13,
+        ],
+        [
+            8.333_333_333_333_24e-3,
+            2.755_731_921_273_418_6e-6,
+            1.605_894_353_020_852e-10,
+            2.721_582_092_018_794e-15,
+        ],
+    );
+    let y = (a * z).mul_add(bent, a).smaller(V::splat(1.0));
+    let signed = y.or(r.signs()).xor(shifted.up::<63>());
+    let inside = x.abs().at_most(V::splat(HUGE));
+    signed.rescued(inside, [x, x], library)
+}
+
+/// The sine; of huge arguments the library's.
+#[inline(always)]
+pub fn sin<V: Vector>(x: V) -> V {
+    wave(x, None, |x, _| x.sin())
+}
+
+/// The cosine; of huge arguments the library's.
+#[inline(always)]
+pub fn cos<V: Vector>(x: V) -> V {
+    wave(x, Some(0.5), |x, _| x.cos())
+}
+
 /// π/2 in two parts.
-const HALF_TURN: [f64; 2] = [FRAC_PI_2, 6.123_233_995_736_766e-17];
+const QUARTER_TURN: [f64; 2] = [FRAC_PI_2, 6.123_233_995_736_766e-17];
 
 /// Up to here x less k times the first part is exact.
 const LARGE: f64 = 1.6e6;
@@ -27,12 +85,12 @@ struct Reduced<V> {
 fn reduced<V: Vector>(x: V) -> Reduced<V> {
     let shifted = x.mul_add(V::splat(FRAC_2_PI), V::splat(MAGIC));
     let k = shifted - V::splat(MAGIC);
-    let s = k.mul_add(V::splat(-HALF_TURN[0]), x);
-    let r = k.mul_add(V::splat(-HALF_TURN[1]), s);
+    let s = k.mul_add(V::splat(-QUARTER_TURN[0]), x);
+    let r = k.mul_add(V::splat(-QUARTER_TURN[1]), s);
     // r is to s − k·low what rounding left of it, unless nearly all of s was cancelled
     let resolved = (k * V::splat(2e-16)).abs().at_most(r.abs());
     Reduced {
-        over: k.mul_add(V::splat(HALF_TURN[1]), r - s),
+        over: k.mul_add(V::splat(QUARTER_TURN[1]), r - s),
         inside: x.abs().at_most(V::splat(LARGE)).and(resolved),
         r,
         shifted,
@@ -40,11 +98,10 @@ fn reduced<V: Vector>(x: V) -> Reduced<V> {
 }
 
 impl<V: Vector> Reduced<V> {
-    /// Whether k is odd, as a mask's sign, and the sign of the quadrant; k counted from `first`.
+    /// Whether k is odd, as a mask's sign.
     #[inline(always)]
-    fn quadrant(&self, first: u64) -> [V; 2] {
-        let quadrant = self.shifted.plus_bits(V::splat(f64::from_bits(first)));
-        [quadrant.up::<63>(), quadrant.up::<62>().signs()]
+    fn is_odd(&self) -> V {
+        self.shifted.up::<63>()
     }
 
     /// sin(r − over).
@@ -95,33 +152,12 @@ impl<V: Vector> Reduced<V> {
     }
 }
 
-/// The sine, begun at that quarter of a turn.
-#[inline(always)]
-fn wave<V: Vector>(x: V, first: u64, library: fn(f64, f64) -> f64) -> V {
-    let reduced = reduced(x);
-    let [odd, sign] = reduced.quadrant(first);
-    let y = V::choose(odd, reduced.cos(), reduced.sin()).xor(sign);
-    y.rescued(reduced.inside, [x, x], library)
-}
-
-/// The sine; of huge arguments, and next to its zeros, the library's.
-#[inline(always)]
-pub fn sin<V: Vector>(x: V) -> V {
-    wave(x, 0, |x, _| x.sin())
-}
-
-/// The cosine; of huge arguments, and next to its zeros, the library's.
-#[inline(always)]
-pub fn cos<V: Vector>(x: V) -> V {
-    wave(x, 1, |x, _| x.cos())
-}
-
 /// The tangent; of huge arguments, and next to its zeros and poles, the library's.
 #[inline(always)]
 pub fn tan<V: Vector>(x: V) -> V {
     let reduced = reduced(x);
     let (sin, cos) = (reduced.sin(), reduced.cos());
-    let [odd, _] = reduced.quadrant(0);
+    let odd = reduced.is_odd();
     let quotient = V::choose(odd, cos, sin) / V::choose(odd, sin, cos);
     let y = quotient.xor(odd.signs());
     y.rescued(reduced.inside, [x, x], |x, _| x.tan())
@@ -211,13 +247,11 @@ pub fn atan2<V: Vector>(y: V, x: V) -> V {
     let den = V::choose(inverted, a, b);
     let found = angle(num, den).turned(inverted, 2.0).turned(x, 4.0);
     let angle = found.value().or(y.signs());
-    let large = den.at_most(V::splat(1e300));
-    let ratio = (den * V::splat(1e-300)).at_most(num);
-    let inside = V::splat(1e-150).at_most(den).and(large).and(ratio);
-    let inside = inside.or(V::splat(0.0)
-        .below(x)
-        .and(large)
-        .and(V::splat(1e-150).at_most(den)));
+    // to the left the ratio must not underflow, to the right it may
+    let least = V::choose(x, num, den);
+    let inside = V::splat(1e-150)
+        .at_most(least)
+        .and(den.at_most(V::splat(1e300)));
     angle.rescued(inside, [y, x], f64::atan2)
 }
 

@@ -15,8 +15,8 @@
 //! |---|---|---|
 //! | [`exp`] | 1.1 | never |
 //! | [`ln`] | 0.8 | subnormal numbers |
-//! | [`sin`], [`cos`] | 0.8 | beyond 1.6·10⁶, and the numbers nearest to multiples of π/2 |
-//! | [`tan`] | 1.8 | the same |
+//! | [`sin`], [`cos`] | 2.0 | beyond 10⁹ |
+//! | [`tan`] | 1.8 | beyond 1.6·10⁶, and the numbers nearest to multiples of π/2 |
 //! | [`asin`], [`acos`] | 1.8 | never |
 //! | [`atan`] | 1.8 | never |
 //! | [`atan2`] | 1.8 | extreme points and ratios |

@@ -57,6 +57,11 @@ fn exact_binary(op: Binary, x: f64, y: f64) -> BigFloat {
     space.binary(op, &space.constant(x), &space.constant(y))
 }
 
+/// The origin has no angle: intervals say that it is undefined, numbers give 0.
+fn is_without_angle(op: Binary, y: f64, x: f64) -> bool {
+    op == Binary::Atan2 && y == 0.0 && x == 0.0
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
 
@@ -75,6 +80,7 @@ proptest! {
         (y, b) in interval_and_member(),
         op in prop::sample::select(&Binary::ALL[..]),
     ) {
+        prop_assume!(!is_without_angle(op, a, b));
         let result = Intervals.binary(op, &x, &y);
         let float = Reals.binary(op, &a, &b);
         let verdict = check(result, &exact_binary(op, a, b), float);
@@ -93,9 +99,8 @@ proptest! {
         let y = Interval::new(r.min(s), r.max(s)).expect("in order");
         let a = if place[0] { x.lo() } else { x.hi() };
         let b = if place[1] { y.lo() } else { y.hi() };
+        prop_assume!(!is_without_angle(op, a, b));
         let result = Intervals.binary(op, &x, &y);
-        let at_origin = op == Binary::Atan2 && a == 0.0 && b == 0.0;
-        prop_assume!(!at_origin);
         let verdict = check(result, &exact_binary(op, a, b), Reals.binary(op, &a, &b));
         prop_assert!(verdict.is_ok(), "{op:?} of {x} and {y} at {a}, {b}: {verdict:?}");
     }

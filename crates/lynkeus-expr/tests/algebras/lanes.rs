@@ -53,6 +53,7 @@ fn subjects() -> Vec<Subject> {
         ranges: ranges.to_vec(),
     };
     let circle = [(-4.0, 4.0), (-1e3, 1e3), (-1.6e6, 1.6e6), (-1e-3, 1e-3)];
+    let wave = [(-4.0, 4.0), (-1e3, 1e3), (-1e9, 1e9), (-1e-3, 1e-3)];
     let unit = [(-1.0, 1.0), (-0.01, 0.01), (0.45, 0.55), (0.99, 1.0)];
     let hyperbola = [(-1.0, 1.0), (-5.0, 5.0), (-710.0, 710.0), (0.9, 1.1)];
     vec![
@@ -77,8 +78,8 @@ fn subjects() -> Vec<Subject> {
                 (1.0, 1e300),
             ],
         ),
-        one(Unary::Sin, 0.8, &circle),
-        one(Unary::Cos, 0.8, &circle),
+        one(Unary::Sin, 2.0, &wave),
+        one(Unary::Cos, 2.0, &wave),
         one(Unary::Tan, 1.8, &circle),
         one(Unary::Asin, 1.8, &unit),
         one(Unary::Acos, 1.8, &unit),

@@ -9,7 +9,8 @@
 //! with the slopes θ of the nonlinear terms of F ([`lynkeus_structure::slopes`]). A
 //! common Lyapunov function eᵀPe for every θ on the box proves the decay, whatever
 //! family the observer is of. Linear matrix inequalities find P
-//! ([`lynkeus_proof::decay`]); interval arithmetic accepts or rejects it.
+//! ([`lynkeus_proof::decay`]); interval arithmetic accepts or rejects it. Where the slopes are too many apart, they are
+//! taken as they come together at every point of the box ([`lynkeus_proof::decay::holds_together`]).
 //!
 //! What is left of the error as t → ∞ when something acts on the plant that the
 //! observer does not know, and when the measurements err.
@@ -27,6 +28,7 @@ mod lmi;
 mod refute;
 mod said;
 mod sampled;
+mod together;
 
 pub use correction::{Correction, Injection};
 pub use lmi::is_certified_gain;
@@ -115,11 +117,32 @@ fn certified(
         }
         (true, Claim::At(rate)) => decay::prove(&system.models, &system.scale, rate, &search),
     };
+    let together = match found {
+        None if system.is_bounded() && !sample.unstable => {
+            let rate = match claim {
+                Claim::Fastest => None,
+                Claim::At(rate) => Some(rate),
+            };
+            let rate = (rate, sample.limit);
+            together::together(augmented, observer, &system, rate, &search)?
+        }
+        _ => None,
+    };
     let spent = search.marked();
-    hypotheses.push(match (&found, spent) {
-        (None, Some(spent)) => undecided(Inequality::OneLyapunovFunction, Reason::Spent(spent)),
+    hypotheses.push(match (&found, &together, spent) {
+        (None, None, Some(spent)) => {
+            undecided(Inequality::OneLyapunovFunction, Reason::Spent(spent))
+        }
+        (_, Some(together), _) => {
+            let (rate, parts) = (together.proof.rate, together.parts);
+            proved(
+                Inequality::OneLyapunovFunction,
+                Said::HoldsTogether { rate, parts },
+            )
+        }
         _ => inequality(&system, &sample, found.as_ref()),
     });
+    let found = found.or(together.map(|together| together.proof));
     let mut certificate = Certificate::new(BASIS, assumptions, hypotheses);
     match found {
         Some(proof) => {

@@ -43,6 +43,13 @@ pub enum Said {
         /// for so many slopes
         slopes: usize,
     },
+    /// it holds at a rate of the slopes together, as they are at each point of the box
+    HoldsTogether {
+        /// the rate
+        rate: f64,
+        /// parts into which the box was divided to see it
+        parts: usize,
+    },
     /// it cannot hold: the error's Jacobian is not stable at this point, with this largest real part
     Unstable(Point),
     /// no P was found for so many slopes

@@ -79,7 +79,7 @@ fn over_innovations(P: &DMatrix<f64>, shown: &[usize]) -> IntervalMatrix {
 }
 
 /// Whether it is a symmetric matrix of numbers.
-fn is_form(P: &DMatrix<f64>) -> bool {
+pub(super) fn is_form(P: &DMatrix<f64>) -> bool {
     P.is_square() && *P == P.transpose() && P.iter().all(|x| x.is_finite())
 }
 

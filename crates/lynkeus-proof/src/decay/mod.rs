@@ -25,6 +25,7 @@ pub use check::{holds, holds_between_samples};
 pub use growth::is_unstable;
 pub use sampled::{longest, prove_between_samples};
 pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};
+pub use together::{Covered, Field, Together, fastest_together, holds_together, prove_together};
 
 mod analysis;
 mod check;
@@ -32,6 +33,7 @@ mod frame;
 mod growth;
 mod sampled;
 mod synthesis;
+mod together;
 
 /// A Lyapunov function with its multipliers: what has to be checked.
 #[derive(Clone, Debug, PartialEq)]

@@ -80,6 +80,7 @@ use crate::divergence::{Bound, check_deviations};
 use crate::manifold::Manifold;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::standing::{self, Errors, Stand, Standing};
 use crate::{Error, EstimatorSettings, Result};
 use belief::{Projection, confine};
 use ekf::Ekf;
@@ -490,6 +491,34 @@ impl Runner for Filter {
             Some(history) => history.walk(walk, n),
             None => Ok(()),
         }
+    }
+
+    /// What every row draws anew is left out.
+    fn stand(&self) -> Stand<'_> {
+        let (n, own) = (self.belief.x.len(), self.deviations.len());
+        let rows = self.belief.root.entries.chunks_exact(n.max(1)).take(own);
+        Stand {
+            names: &self.propagation.driven.system().states()[..own],
+            own,
+            x: &self.belief.x[..own],
+            errors: Errors::Root(rows.flat_map(|row| &row[..own]).copied().collect()),
+        }
+    }
+
+    fn resume(&mut self, sample: &Sample<'_>, standing: &Standing) -> Result<()> {
+        if let Errors::Particles { .. } = standing.errors {
+            return Err(standing::other_errors("a covariance", "particles"));
+        }
+        let names = self.propagation.driven.system().states();
+        let places = standing.places(names, self.deviations.len())?;
+        standing.fill(&places, &mut self.belief.x);
+        standing.fill_root(&places, &mut self.belief.root)?;
+        self.bound.see(&self.belief.x);
+        self.propagation.driven.start(sample.inputs);
+        if let Engine::MovingHorizon(mhe) = &mut self.engine {
+            mhe.begin(sample, &self.belief);
+        }
+        Ok(())
     }
 
     fn copied(&self) -> Box<dyn Runner> {

@@ -262,3 +262,100 @@ fn what_is_no_delay_is_refused() {
     begun.push(0.0, &[0.0; 3]).unwrap();
     assert!(Late::new(begun, &[], 1.0).is_err());
 }
+
+/// Another filter goes on where one stands: with the same numbers it gives the same, whatever comes late.
+#[test]
+fn what_is_taken_over_goes_on_as_before() {
+    for (seed, kind) in (300..).zip(kinds()) {
+        for (before, wait) in [(2.0, 2.0), (0.0, 0.0), (2.0, 0.0), (0.0, 2.0)] {
+            let mut random = Random(seed);
+            let rows = rows(&mut random, 60);
+            let (early, late) = rows.split_at(30);
+            let mut old = Late::new(filter(kind.clone()), &[], before).unwrap();
+            for (t, signals) in early {
+                old.push(*t, signals).unwrap();
+            }
+            let handover = old.handover();
+            assert_eq!(handover.rows.is_empty(), before == 0.0);
+            let mut new = Late::new(filter(kind.clone()), &[], wait).unwrap();
+            new.take_over(&handover).unwrap();
+            let what = format!("{kind:?}, {before}, {wait}");
+            let agree = |new: &Late, old: &[f64]| {
+                // a window begins anew with what is believed, and particles with other random numbers
+                let most = match kind {
+                    FilterKind::MovingHorizon(_) => 1e-3,
+                    FilterKind::Particles(_) => 0.1,
+                    _ => 1e-9,
+                };
+                let pairs = new.estimate().iter().zip(old);
+                let off = pairs.map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+                assert!(off < most, "{what}: {off}");
+            };
+            agree(&new, old.estimate());
+            assert_eq!(new.time(), old.time());
+            if wait > 0.0 && before > 0.0 {
+                // between two rows from before
+                let t = (early[28].0 + early[29].0) / 2.0;
+                for filter in [&mut old, &mut new] {
+                    filter.push(t, &[0.1, 0.2, f64::NAN]).unwrap();
+                }
+                agree(&new, old.estimate());
+            } else if wait > 0.0 {
+                // from before what was taken over there is nothing to go back to
+                let error = new.push(early[28].0, &[0.1, 0.2, 0.0]).unwrap_err();
+                assert!(matches!(error, Error::TooLate { .. }), "{error}");
+            }
+            for (t, signals) in late {
+                old.push(*t, signals).unwrap();
+                new.push(*t, signals).unwrap();
+            }
+            agree(&new, old.estimate());
+            assert!(new.take_over(&handover).is_err(), "it has begun");
+        }
+    }
+}
+
+/// One that has nothing but what was read goes over it from the start.
+#[test]
+fn a_young_one_is_gone_over_from_its_start() {
+    let mut random = Random(9);
+    let rows = rows(&mut random, 8);
+    let mut old = Late::new(filter(FilterKind::Extended), &[], 100.0).unwrap();
+    for (t, signals) in &rows {
+        old.push(*t, signals).unwrap();
+    }
+    let mut new = Late::new(filter(FilterKind::Extended), &[], 100.0).unwrap();
+    let handover = old.handover();
+    assert_eq!(handover.standing, None);
+    new.take_over(&handover).unwrap();
+    same(&new, &old, "from the start");
+}
+
+#[test]
+fn other_kinds_of_filters_take_over_what_they_can() {
+    let mut random = Random(10);
+    let rows = rows(&mut random, 20);
+    let begun = |kind: FilterKind| {
+        let mut filter = filter(kind);
+        for (t, signals) in &rows {
+            filter.push(*t, signals).unwrap();
+        }
+        filter.standing().unwrap()
+    };
+    let [particles, extended, unscented, horizon] = kinds();
+    let standing = begun(extended.clone());
+    for kind in [unscented, horizon, extended.clone()] {
+        let mut other = filter(kind);
+        other.resume(&standing).unwrap();
+        assert_eq!(
+            bits(other.estimate()),
+            bits(&standing.states.iter().map(|s| s.1).collect::<Vec<_>>())
+        );
+    }
+    for (kind, standing) in [(particles.clone(), standing), (extended, begun(particles))] {
+        let mut other = filter(kind);
+        let error = other.resume(&standing).unwrap_err();
+        assert!(error.to_string().contains("particles"), "{error}");
+        assert_eq!(other.time(), None);
+    }
+}

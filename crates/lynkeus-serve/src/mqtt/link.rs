@@ -132,6 +132,11 @@ impl Link {
             Err(error) => return Err(error.to_string()),
         };
         self.heard = Instant::now();
+        // a broker counts what it gets, however much it sends
+        if self.sent.elapsed() > BEAT {
+            packet::ping(&mut self.to);
+            self.flush()?;
+        }
         let skipped = count.min(self.skip);
         self.skip -= skipped;
         self.read.extend_from_slice(&room[skipped..count]);
@@ -267,5 +272,33 @@ mod tests {
         ] {
             assert!(place(wrong).is_err(), "{wrong}");
         }
+    }
+
+    /// Where messages come without a pause and nothing is published, a broker would give the client up.
+    #[test]
+    fn it_gives_a_sign_of_life_while_messages_come() {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut link = Link {
+            wire: Wire::Plain(TcpStream::connect(listener.local_addr().unwrap()).unwrap()),
+            version: MqttVersion::V3,
+            read: vec![],
+            skip: 0,
+            to: vec![],
+            sent: Instant::now().checked_sub(2 * BEAT).unwrap(),
+            heard: Instant::now(),
+        };
+        let (mut broker, _) = listener.accept().unwrap();
+        let mut read = || {
+            broker.write_all(b"\x30\x04\0\x01ta").unwrap();
+            let mut ping = [0; 2];
+            let packets = link.receive().unwrap();
+            assert!(matches!(packets[..], [Packet::Message(_)]), "{packets:?}");
+            broker.set_nonblocking(true).unwrap();
+            let sent = broker.read(&mut ping).ok().map(|_| ping);
+            broker.set_nonblocking(false).unwrap();
+            sent
+        };
+        assert_eq!(read(), Some([0xc0, 0]));
+        assert_eq!(read(), None);
     }
 }

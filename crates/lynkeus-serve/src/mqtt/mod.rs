@@ -60,6 +60,8 @@ struct Inbound {
     is_retained: bool,
     /// nanoseconds since 1970
     came: i128,
+    /// it could not be kept so far, which was said
+    is_kept_back: bool,
 }
 
 /// Why there is no connection.
@@ -110,8 +112,12 @@ pub fn serve(
         topics::checked(pattern, engine)?;
     }
     let has_assets = engine.has_names();
+    let topics = Topics::new(settings, &reader, has_assets)?;
+    for own in settings.publish.iter().chain(&settings.status) {
+        topics.refuse_own(own, engine)?;
+    }
     let mut service = Service {
-        topics: Topics::new(settings, &reader, has_assets)?,
+        topics,
         client: client(settings, &reader),
         engine,
         reader,
@@ -360,6 +366,7 @@ impl Service<'_> {
                     id,
                     is_retained,
                     came: now(),
+                    is_kept_back: false,
                 });
             }
             Packet::Acknowledged { id, code } => {
@@ -396,7 +403,7 @@ impl Service<'_> {
         let mut answers = self.engine.take(&rows).into_iter().zip(&rows);
         let mut first = 0;
         let mut kept_back = VecDeque::new();
-        for (message, end) in messages.into_iter().zip(ends) {
+        for (mut message, end) in messages.into_iter().zip(ends) {
             let mut is_kept = true;
             for (answer, row) in answers.by_ref().take(end - first) {
                 match answer {
@@ -425,8 +432,10 @@ impl Service<'_> {
                     }
                     Err(Refusal::NotKept(why)) => {
                         is_kept = false;
-                        self.refused += 1;
-                        tell_refusal((self.refused, self.board), &why, self.tell);
+                        if !std::mem::replace(&mut message.is_kept_back, true) {
+                            self.refused += 1;
+                            tell_refusal((self.refused, self.board), &why, self.tell);
+                        }
                     }
                 }
             }

@@ -74,7 +74,8 @@ impl Outbox {
     /// A new connection: what was not acknowledged is sent once more, and what is owed to the one before will come again.
     pub fn begin(&mut self, welcome: &Welcome, to: &mut Vec<u8>) {
         self.owed.clear();
-        self.room = welcome.on_the_way;
+        // with more than there are numbers for, none would be free
+        self.room = welcome.on_the_way.min(MOST);
         self.acknowledges = welcome.acknowledges;
         if welcome.has_session && self.sends_ids() {
             for (id, waiting) in &self.sent {
@@ -138,6 +139,29 @@ mod tests {
             payload: text.into(),
             retain: false,
         }
+    }
+
+    /// A row that corrects thousands gives as many messages at once: more than there are numbers for.
+    #[test]
+    fn any_number_may_wait() {
+        let mut outbox = Outbox::new(MqttVersion::V3, 1);
+        let welcome = Welcome {
+            has_session: false,
+            on_the_way: usize::from(u16::MAX),
+            acknowledges: true,
+        };
+        outbox.begin(&welcome, &mut vec![]);
+        (0..70_000).for_each(|_| outbox.push(message("a")));
+        outbox.owe(1);
+        let mut acknowledged = 0;
+        while !outbox.is_done() {
+            outbox.write(&mut vec![]);
+            let ids: Vec<u16> = outbox.sent.iter().map(|(id, _)| *id).collect();
+            assert!(ids.len() <= MOST);
+            acknowledged += ids.len();
+            ids.into_iter().for_each(|id| outbox.is_there(id));
+        }
+        assert_eq!(acknowledged, 70_000);
     }
 
     /// What came is acknowledged only after what it gave has arrived, and that is sent again until it has.

@@ -93,6 +93,27 @@ impl Topics {
         filters
     }
 
+    /// What is published must not come back as a row, which would be published again.
+    ///
+    /// # Errors
+    /// It would.
+    pub fn refuse_own(&self, own: &Name, engine: &Engine) -> Result<(), Error> {
+        let name = engine.names().first().map_or("", String::as_str);
+        let topic = told(own, name);
+        let comes_back = |pattern: &Pattern| matched(&pattern.levels, &topic).is_some();
+        match self.0.iter().any(comes_back) {
+            false => Ok(()),
+            true => {
+                let text = format!(
+                    "what is published under \"{}\" would come back as a row",
+                    own.text
+                );
+                let hint = "publish under a topic that `topics` and `rows` have not";
+                Err(own.blame(Error::input(text).hint(hint)))
+            }
+        }
+    }
+
     /// What a payload under a topic says, which came at `came` (nanoseconds since 1970).
     ///
     /// # Errors

@@ -286,7 +286,11 @@ async fn session(
     stop: &AtomicBool,
 ) -> Result<(), Ended> {
     let url = &asked.settings.url.text;
-    let (session, events) = connected(client, &asked.settings).await?;
+    let connecting = connected(client, &asked.settings);
+    let Some(connected) = unless_stopped(connecting, stop).await else {
+        return Ok(());
+    };
+    let (session, events) = connected?;
     let mut events = pin!(events.enter());
     let begin = || {
         tokio::spawn(work(
@@ -347,6 +351,18 @@ async fn session(
     part(&session, events.as_mut(), LAST).await;
     work.abort();
     Ok(())
+}
+
+/// What comes of some work; none where it is to stop before.
+async fn unless_stopped<T>(work: impl Future<Output = T>, stop: &AtomicBool) -> Option<T> {
+    let mut work = pin!(work);
+    while !stop.load(Ordering::Relaxed) {
+        tokio::select! {
+            done = &mut work => return Some(done),
+            () = sleep(LOOK) => {}
+        }
+    }
+    None
 }
 
 /// Ends a session after a while; nothing is sent or read unless its events are followed.
@@ -501,7 +517,7 @@ async fn kinds(session: &Session, nodes: &[NodeId]) -> Result<Vec<Kind>, Ended> 
 
 /// Asks for all changes of the nodes that are read.
 async fn subscribe(session: &Session, asked: &Arc<Asked>, teller: &Teller) -> Result<(), Ended> {
-    let interval = Duration::from_secs_f64(asked.settings.interval.clamp(0.01, 3600.0));
+    let interval = Duration::from_secs_f64(asked.settings.interval);
     let beats = (AWAY.as_secs_f64() / interval.as_secs_f64()).ceil();
     // three times the beats between signs of life, at least
     let lifetime = beats.clamp(30.0, 1e6) as u32;

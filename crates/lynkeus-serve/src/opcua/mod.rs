@@ -253,6 +253,8 @@ impl Service<'_> {
     /// Takes rows of some changes, and writes what they give.
     fn take(&mut self, changes: &[Change], is_over: &dyn Fn() -> bool) {
         let mut rows = self.rows(changes);
+        // what is tried again was counted before
+        let mut is_again = false;
         while !rows.is_empty() && !is_over() {
             let answers = self.engine.take(&rows);
             let mut kept_back = vec![];
@@ -265,7 +267,9 @@ impl Service<'_> {
                         self.show(row.asset, &lines);
                     }
                     Err(Refusal::NotKept(why)) => {
-                        self.refuse(&format!("not taken: {why}; it is tried again"));
+                        if !is_again {
+                            self.refuse(&format!("not taken: {why}; it is tried again"));
+                        }
                         kept_back.push(row);
                     }
                     Err(Refusal::Unusable(why)) => {
@@ -280,6 +284,7 @@ impl Service<'_> {
                 }
             }
             rows = kept_back;
+            is_again = true;
         }
     }
 

@@ -127,18 +127,24 @@ fn one_state_has_one_instance() {
 }
 
 #[test]
-fn a_state_of_another_study_is_refused_and_left_alone() {
+fn a_state_of_another_plant_is_refused_and_left_alone() {
     let folder = folder("ekf", KEPT);
     let rows = rows(15, 20, true);
     served(&folder, "json", &json(&rows));
     let before = std::fs::read(folder.path.path().join("tank.state")).unwrap();
     let study = folder.read("study.toml");
-    folder.change("study.toml", "y = 0.1", "y = 0.2");
+    let other = ["Real q", "= q;", "0.1*q", "0.4*q", "der(q)"];
+    let other = other.iter().fold(PLANT.to_owned(), |plant, part| {
+        plant.replace(part, &part.replace('q', "r"))
+    });
+    folder.write("tank.mo", &other);
+    folder.write("study.toml", &study.replace("q =", "r ="));
     let ended = served(&folder, "json", "");
     assert_eq!(ended.code, 2);
-    assert!(ended.err.contains("of another study"), "{}", ended.err);
+    assert!(ended.err.contains("cannot be taken over"), "{}", ended.err);
     // rolled back it goes on
     folder.write("study.toml", &study);
+    folder.write("tank.mo", PLANT);
     assert!(before == std::fs::read(folder.path.path().join("tank.state")).unwrap());
     let ended = served(&folder, "json", "");
     assert!(ended.err.contains("went on after row 20"), "{}", ended.err);

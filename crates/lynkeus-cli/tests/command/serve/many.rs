@@ -1,5 +1,6 @@
 //! Many plants of one study.
 
+use super::process::Serving;
 use super::*;
 
 #[test]
@@ -84,5 +85,48 @@ fn assets_that_are_wrong_are_refused_by_their_line() {
         let ended = served(&folder, "json", "");
         assert_eq!(ended.code, 2);
         assert!(ended.err.contains(words), "{}", ended.err);
+    }
+}
+
+/// Rows since the last snapshot are those of their assets, wherever these stand in the table after a kill.
+#[test]
+fn a_table_may_change_after_a_kill() {
+    let folder = folder(
+        "ekf",
+        "[estimate]\nsd = true\n[serve]\nassets = \"assets.csv\"\nstate = \"all.state\"",
+    );
+    folder.write("assets.csv", "asset\na\nb\nc\n");
+    let all: Vec<Vec<Row>> = (0..3).map(|i| rows(60 + i, 20, true)).collect();
+    let input = |range: std::ops::Range<usize>| -> String {
+        let names = ["a", "b", "c"].iter().zip(&all);
+        let rows =
+            names.flat_map(|(name, rows)| rows[range.clone()].iter().map(move |row| (name, row)));
+        rows.map(|(name, row)| format!("{{\"asset\":\"{name}\",{}", &row.json()[1..]))
+            .collect()
+    };
+    let mut serving = Serving::new(&folder, "json", "");
+    serving.send(&input(0..10));
+    let mut answers: Vec<Value> = (0..30)
+        .map(|_| serde_json::from_str(&serving.answer().unwrap()).unwrap())
+        .collect();
+    serving.kill();
+    folder.write("assets.csv", "asset\nnew\nc\na\n");
+    let ended = served(&folder, "json", &input(10..20));
+    assert!(
+        ended.err.contains("the state of \"b\" is left out"),
+        "{}",
+        ended.err
+    );
+    assert!(
+        ended.err.contains("the state before is all.state.20"),
+        "{}",
+        ended.err
+    );
+    answers.extend(lines(&ended.out));
+    let alone = super::folder("ekf", "[estimate]\nsd = true");
+    for (name, rows) in [("a", &all[0]), ("c", &all[2])] {
+        let own = answers.iter().filter(|line| line["asset"] == name);
+        let own: Vec<Value> = own.cloned().collect();
+        assert!(last(&own) == estimated(&alone, rows), "{name}");
     }
 }

@@ -2,6 +2,7 @@
 
 mod broker;
 mod browsed;
+mod changed;
 mod hostile;
 mod kept;
 mod many;

@@ -177,8 +177,8 @@ fn a_kill_loses_no_message_and_takes_none_twice() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn a_hundred_kills_lose_no_message_and_take_none_twice() {
-    killed(100, 64);
+fn two_hundred_kills_lose_no_message_and_take_none_twice() {
+    killed(200, 64);
 }
 
 #[test]
@@ -497,6 +497,14 @@ fn settings_of_a_broker_that_are_none_are_refused() {
         (
             "url = \"mqtt://localhost\"\nrows = \"r\"\nqos = 2",
             "0 or 1",
+        ),
+        (
+            "url = \"mqtt://localhost\"\nrows = \"r\"\npublish = \"r\"",
+            "what is published under \"r\" would come back as a row",
+        ),
+        (
+            "url = \"mqtt://localhost\"\nrows = \"r\"\n[serve.opcua]\nurl = \"opc.tcp://localhost\"\nnodes = { y = \"i=1\" }\ninterval = 5000",
+            "must be a number in [1e-2, 3600], found 5000",
         ),
         (
             "url = \"mqtt://localhost\"\nrows = \"r\"\nversion = \"4\"",

@@ -275,7 +275,11 @@ fn what_no_server_has_is_refused() {
         ),
         ("level_hat", "lvl_hat", "no answer of this study has it"),
         ("ns=2;s=a\"", "ns=2;s={asset}\"", "names no `assets`"),
-        ("interval = 0.05", "interval = 0", "a number > 0"),
+        (
+            "interval = 0.05",
+            "interval = 0",
+            "a number in [1e-2, 3600]",
+        ),
         (
             "interval = 0.05",
             "security = \"none\"",
@@ -310,4 +314,92 @@ fn what_no_server_has_is_refused() {
         assert_eq!(ended.code, 2, "{to}: {}", ended.err);
         assert!(ended.err.contains(words), "{to}: {}", ended.err);
     }
+}
+
+/// Kills at any moment: what the state has goes on, and what the source sends again counts once.
+fn killed(kills: usize, seed: u64) {
+    let port = port();
+    let folder = folder_at(port);
+    let Some(mut server) = Server::new(&folder, port) else {
+        return;
+    };
+    let rows = rows(seed, 4 * (kills + 1), true);
+    let expected = expected(&folder, &rows);
+    let mut random = Normal(seed);
+    // the estimate at a row is right where all rows up to it were taken; from there on the source sends again, and the row
+    // before, whose input counts from it on
+    let is_wrong = |found: &BTreeMap<String, Vec<u64>>, row: &Row| {
+        let at = date(row.t);
+        found.get(&at) != expected.get(&at)
+    };
+    let left = |folder: &Folder, end: usize| {
+        let found = history(folder);
+        let first = rows[..end].iter().position(|row| is_wrong(&found, row));
+        first.map_or(&[][..], |first| &rows[first.saturating_sub(1)..end])
+    };
+    let mut end = 4;
+    for round in 0..kills {
+        let mut serving = Serving::begin(&folder, &[], "");
+        serving.wait_for("is connected");
+        if round == 0 {
+            for change in changes(&rows[0]) {
+                server.set(change, "0");
+            }
+            wait_until("no first row", || history(&folder).len() == 1);
+        }
+        // new values come once the others are there: a server that sends the newest first must not send it too early
+        if left(&folder, end).is_empty() {
+            end = (end + 4).min(rows.len());
+        }
+        for change in left(&folder, end).iter().flat_map(changes) {
+            server.set(change, "0");
+        }
+        let wait = 300.0 * random.uniform();
+        thread::sleep(Duration::from_millis(wait as u64));
+        serving.kill();
+        server.has_all();
+    }
+    let serving = Serving::begin(&folder, &[], "");
+    serving.wait_for("is connected");
+    wait_until("the history is not what is expected", || {
+        if left(&folder, end).is_empty() {
+            end = (end + 20).min(rows.len());
+        }
+        for change in left(&folder, end).iter().flat_map(changes) {
+            server.set(change, "0");
+        }
+        server.has_all();
+        thread::sleep(Duration::from_millis(500));
+        history(&folder) == expected
+    });
+    serving.stop();
+    let text: String = folder
+        .files()
+        .iter()
+        .filter(|name| name.starts_with("tank-"))
+        .map(|name| folder.read(name))
+        .collect();
+    let told = text
+        .lines()
+        .filter(|line| line.starts_with('2'))
+        .map(|line| {
+            let (rest, revision) = line.rsplit_once(',').unwrap();
+            format!("{} {revision}", rest.split(',').next().unwrap())
+        });
+    let mut told: Vec<String> = told.collect();
+    let count = told.len();
+    told.sort();
+    told.dedup();
+    assert_eq!(count, told.len());
+}
+
+#[test]
+fn a_kill_takes_nothing_twice() {
+    killed(3, 73);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn two_hundred_kills_take_nothing_twice() {
+    killed(200, 74);
 }

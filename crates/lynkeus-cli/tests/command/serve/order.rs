@@ -136,3 +136,49 @@ fn silence_hanging_and_jumps_are_told() {
     assert_eq!(lines[94]["credible"], false);
     assert!(notes(95).contains("no row for 4906"), "{}", notes(95));
 }
+
+/// A sensor's screens see its readings in the order of their samples, whenever they came: a reading that is none because
+/// of one that came late is taken back, and one that is one after all counts.
+#[test]
+fn screens_look_at_the_samples_in_their_order() {
+    for (seed, more) in [
+        (21, "repeats = { y = \"missing\" }"),
+        (22, "frozen = { y = 2, a = 3 }"),
+        (
+            23,
+            "repeats = { y = \"missing\" }\nplausible = { y = [0, 2.15] }\ndelay = { a = 1 }",
+        ),
+    ] {
+        let folder = folder("ekf", WAIT);
+        folder.change("study.toml", "[sensors]", &format!("[sensors]\n{more}"));
+        let mut random = Normal(seed);
+        let mut rows = rows(seed, 60, true);
+        // a value holds now and then, as a historian sends it
+        for k in 1..rows.len() {
+            if random.uniform() < 0.6 {
+                (rows[k].y, rows[k].a) = (rows[k - 1].y, rows[k - 1].a);
+            }
+        }
+        let late = shuffled(&rows, seed, 3.5);
+        // parts of a row apart, too
+        let mut input = String::new();
+        for row in &late {
+            match random.uniform() < 0.3 && row.t > rows[0].t {
+                true => {
+                    input += &Row { a: None, ..*row }.json();
+                    input += &Row { y: None, ..*row }.json();
+                }
+                false => input += &row.json(),
+            }
+        }
+        let ended = served(&folder, "json", &input);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let lines = lines(&ended.out);
+        assert!(
+            lines.iter().all(|line| line["error"].is_null()),
+            "{}",
+            ended.out
+        );
+        assert!(last(&lines) == estimated(&folder, &rows), "{more}");
+    }
+}

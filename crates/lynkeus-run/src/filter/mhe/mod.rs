@@ -108,6 +108,21 @@ impl Mhe {
         })
     }
 
+    /// The window begins at a sample without readings, before which this was believed.
+    pub fn begin(&mut self, sample: &Sample<'_>, belief: &Belief) {
+        self.prior = belief.clone();
+        self.about.clone_from(&belief.x);
+        let mut guess = belief.x.clone();
+        confine(&mut guess, &self.bounds);
+        self.rows.clear();
+        self.rows.push_back(Row {
+            t: sample.t,
+            inputs: sample.inputs.to_vec(),
+            guess,
+            ..Row::default()
+        });
+    }
+
     /// Leaves to a smoother what the last correction has.
     pub fn leave(&mut self, history: &mut History) {
         history.windows.push(std::mem::take(&mut self.window));

@@ -30,6 +30,7 @@ use crate::method::are_finite;
 use crate::noise::Level;
 use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::standing::{self, Errors, Stand, Standing};
 use crate::{Error, EstimatorSettings, Result};
 use code::BLOCK;
 use ensemble::Ensemble;
@@ -475,6 +476,52 @@ impl Runner for ParticleFilter {
 
     fn particles(&self) -> Option<(&[f64], &[f64])> {
         Some((&self.cloud.x, &self.cloud.share))
+    }
+
+    /// What every row draws anew is left out.
+    fn stand(&self) -> Stand<'_> {
+        let (n, own) = (self.estimate.len(), self.deviations.len());
+        let particles = self.cloud.x.chunks_exact(n.max(1));
+        Stand {
+            names: &self.way.system().states()[..own],
+            own,
+            x: &self.estimate[..own],
+            errors: Errors::Particles {
+                x: particles.flat_map(|x| &x[..own]).copied().collect(),
+                log: self.cloud.log.clone(),
+                round: self.round,
+            },
+        }
+    }
+
+    fn resume(&mut self, sample: &Sample<'_>, standing: &Standing) -> Result<()> {
+        let n = self.estimate.len();
+        let places = standing.places(self.way.system().states(), self.deviations.len())?;
+        let (expected, m) = (format!("{} particles", self.count()), standing.states.len());
+        let Errors::Particles { x, log, round } = &standing.errors else {
+            return Err(standing::other_errors(&expected, "none"));
+        };
+        if log.len() != self.count() || x.len() != m * log.len() {
+            let found = format!("{} particles", log.len());
+            return Err(standing::other_errors(&expected, &found));
+        }
+        let pairs = x
+            .chunks_exact(m.max(1))
+            .zip(self.cloud.x.chunks_exact_mut(n));
+        for (from, to) in pairs {
+            for (to, place) in to.iter_mut().zip(&places) {
+                *to = place
+                    .and_then(|place| from.get(place))
+                    .copied()
+                    .unwrap_or(*to);
+            }
+        }
+        self.cloud.give(log.clone());
+        self.round = *round;
+        self.inputs.copy_from_slice(sample.inputs);
+        self.condense();
+        self.bound.see(&self.estimate);
+        Ok(())
     }
 
     fn copied(&self) -> Box<dyn Runner> {

@@ -1,0 +1,513 @@
+//! Decay of e' = A(ξ) e where the entries of A are known together at every ξ of a box: one P for all of them,
+//! checked part by part.
+//!
+//! By the mean value theorem the error of x' = f(x) obeys e' = Ā e, where Ā is the mean of f's Jacobian A over the
+//! segment from x to x̂. For one P the inequality He(P A) + 2·rate·P < 0 holds of a mean if it holds of everything that
+//! the mean is of: of A(ξ) at every ξ of a convex box. Slopes with ranges of their own
+//! ([`ErrorModel`]) would have to be at their worst independently of each other; of x₁x₂ the slopes x₂ and x₁ are
+//! at every point what they are there.
+
+use lynkeus_expr::{Budget, Interval};
+use nalgebra::DMatrix;
+
+use super::check::is_form;
+use super::{ErrorModel, Proof, prove};
+use crate::definite::is_positive_definite;
+use crate::matrix::{IntervalMatrix, points, product, square};
+
+/// Parts of the box that are examined for one P, at most, and for all of a search.
+const PARTS: usize = 12_000;
+const ALL_PARTS: usize = 32_000;
+/// Numbers of which every combination of ends is examined on a part.
+const ENDS: usize = 6;
+/// Corners of the box that P is sought for at first, at most.
+const CORNERS: usize = 64;
+/// Points that are added to them, at most.
+const ADDED: usize = 40;
+/// P is sought for rates faster by these shares of the limit, so that it is left a margin.
+const MARGINS: [f64; 3] = [0.4, 0.12, 0.03];
+/// The rate is found to this relative accuracy.
+const ACCURACY: f64 = 0.03;
+/// Rates below this share of the limit count as none.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// What encloses something on a part of a box.
+type Enclosed<'a, T> = &'a dyn Fn(&[Interval]) -> T;
+
+/// A as a function of a point of a box.
+pub struct Field<'a> {
+    /// encloses A on a part of the box
+    pub on: Enclosed<'a, IntervalMatrix>,
+    /// encloses the derivatives of A in each number there; none where A may jump
+    pub slopes: Option<Enclosed<'a, Vec<IntervalMatrix>>>,
+    /// the box
+    pub sides: Vec<Interval>,
+}
+
+/// Whether the inequality holds on a box.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Covered {
+    /// on so many parts, and so on all of it
+    By(usize),
+    /// not, or not provably, at this point
+    Not(Vec<f64>),
+    /// too many parts, or the budget is spent
+    Unknown,
+}
+
+/// A Lyapunov function eᵀPe with V' ≤ −2·rate·V.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Together {
+    /// P, without multipliers
+    pub proof: Proof,
+    /// parts into which the box is divided
+    pub parts: usize,
+}
+
+/// Whether P > 0 and He(P A(ξ)) + 2·rate·P < 0 for every ξ of the box. Nothing but P, the rate and
+/// interval arithmetic decides.
+pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &Budget) -> Covered {
+    let mut left = PARTS;
+    covered(field, (P, rate), &mut left, budget)
+}
+
+/// The same, with so many parts left to examine.
+fn covered(
+    field: &Field<'_>,
+    (P, rate): (&DMatrix<f64>, f64),
+    left: &mut usize,
+    budget: &Budget,
+) -> Covered {
+    let Some(form) = Form::new(P, rate) else {
+        return Covered::Not(middle(&field.sides));
+    };
+    let mut open = vec![field.sides.clone()];
+    let mut parts = 0;
+    let least = left.saturating_sub(PARTS);
+    while let Some(part) = open.pop() {
+        if *left == least || budget.spent().is_some() {
+            return Covered::Unknown;
+        }
+        *left -= 1;
+        if form.falls(&(field.on)(&part)) {
+            parts += 1;
+            continue;
+        }
+        let point = middle(&part);
+        let center = (field.on)(&points_of(&point));
+        if !form.falls(&center) {
+            return Covered::Not(point);
+        }
+        let along = field.slopes.map(|slopes| slopes(&part));
+        if along.is_some_and(|along| form.falls_along(&center, &along, &part)) {
+            parts += 1;
+            continue;
+        }
+        match form.halves(field, &part) {
+            Some(halves) => open.extend(halves),
+            None => return Covered::Not(point),
+        }
+    }
+    Covered::By(parts)
+}
+
+fn middle(part: &[Interval]) -> Vec<f64> {
+    part.iter().map(|side| side.midpoint()).collect()
+}
+
+fn points_of(point: &[f64]) -> Vec<Interval> {
+    point.iter().map(|&x| Interval::point(x)).collect()
+}
+
+/// He(P A) + 2·rate·P in axes T in which P is about the unit: for an invertible T it is negative definite there
+/// where it is so in those of P, and for another one nowhere.
+struct Form {
+    /// TᵀP and T
+    sides: [IntervalMatrix; 2],
+    /// 2·rate·TᵀPT
+    decay: IntervalMatrix,
+    /// how much an entry of A counts for: the lengths of the columns of TᵀP and of the rows of T
+    weights: [Vec<f64>; 2],
+}
+
+impl Form {
+    fn new(P: &DMatrix<f64>, rate: f64) -> Option<Self> {
+        let sound = is_form(P) && rate.is_finite() && is_positive_definite(&points(P));
+        let T = sound.then(|| P.clone().cholesky()?.l().transpose().try_inverse())??;
+        let left = product(&points(&T.transpose()), &points(P));
+        let right = points(&T);
+        let twice = Interval::point(2.0) * Interval::point(rate);
+        let whole = product(&left, &right);
+        let n = P.nrows();
+        Some(Self {
+            decay: square(n, |i, j| twice * whole[i][j]),
+            weights: [
+                (T.transpose() * P)
+                    .column_iter()
+                    .map(|c| c.norm())
+                    .collect(),
+                T.row_iter().map(|r| r.norm()).collect(),
+            ],
+            sides: [left, right],
+        })
+    }
+
+    /// The lower triangle of −He(TᵀPAT) less another form.
+    fn lower(&self, A: &IntervalMatrix, less: &IntervalMatrix) -> IntervalMatrix {
+        let [left, right] = &self.sides;
+        let middle = product(&product(left, A), right);
+        let entry = |i: usize, j: usize| -(middle[i][j] + middle[j][i] + less[i][j]);
+        let row = |i: usize| (0..=i).map(|j| entry(i, j)).collect();
+        (0..middle.len()).map(row).collect()
+    }
+
+    /// Whether it is negative definite for every A between these.
+    fn falls(&self, A: &IntervalMatrix) -> bool {
+        is_positive_definite(&self.lower(A, &self.decay))
+    }
+
+    /// Whether it is so for every A on a part, from A in its middle and A's derivatives on all of it:
+    /// A = A₀ + Σ δ_k (D_k + R_k), where |δ_k| is at most half of a side, D_k is a number and R_k what is left. It is
+    /// affine in the δ_k of the D_k, so that their ends decide.
+    fn falls_along(
+        &self,
+        center: &IntervalMatrix,
+        slopes: &[IntervalMatrix],
+        part: &[Interval],
+    ) -> bool {
+        let n = center.len();
+        let around = |side: &Interval| *side - Interval::point(side.midpoint());
+        let mut reach: Vec<(f64, usize)> = (0..part.len())
+            .map(|k| (around(&part[k]).magnitude() * self.width_of(&slopes[k]), k))
+            .filter(|(size, _)| *size != 0.0)
+            .collect();
+        reach.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let ends: Vec<usize> = reach.iter().take(ENDS).map(|r| r.1).collect();
+        let mut rest = center.clone();
+        for (k, side) in part.iter().enumerate() {
+            let δ = around(side);
+            for i in 0..n {
+                for j in 0..n {
+                    let slope = slopes[k][i][j];
+                    let own = match ends.contains(&k) {
+                        true => slope - Interval::point(slope.midpoint()),
+                        false => slope,
+                    };
+                    rest[i][j] = rest[i][j] + δ * own;
+                }
+            }
+        }
+        let whole = self.lower(&rest, &self.decay);
+        let still = square(n, |_, _| Interval::ZERO);
+        let along: Vec<(Interval, IntervalMatrix)> = ends
+            .iter()
+            .map(|&k| {
+                let plane = square(n, |i, j| Interval::point(slopes[k][i][j].midpoint()));
+                (around(&part[k]), self.lower(&plane, &still))
+            })
+            .collect();
+        (0..1_usize << along.len()).all(|choice| {
+            let mut rows = whole.clone();
+            for (bit, (δ, plane)) in along.iter().enumerate() {
+                let end = Interval::point(if choice >> bit & 1 == 0 {
+                    δ.lo()
+                } else {
+                    δ.hi()
+                });
+                for (row, plane) in rows.iter_mut().zip(plane) {
+                    for (entry, slope) in row.iter_mut().zip(plane) {
+                        *entry = *entry + end * *slope;
+                    }
+                }
+            }
+            is_positive_definite(&rows)
+        })
+    }
+
+    /// How large it is, as it counts.
+    fn width_of(&self, A: &IntervalMatrix) -> f64 {
+        let [rows, columns] = &self.weights;
+        let entries = A.iter().zip(rows).flat_map(|(row, weight)| {
+            let row = row.iter().zip(columns);
+            row.map(move |(a, column)| a.magnitude() * weight * column)
+        });
+        entries.sum()
+    }
+
+    /// The part cut in two where that helps most; none where it cannot be cut.
+    fn halves(&self, field: &Field<'_>, part: &[Interval]) -> Option<[Vec<Interval>; 2]> {
+        let cut = |side: usize| {
+            let (whole, middle) = (part[side], part[side].midpoint());
+            let is_inner = whole.lo() < middle && middle < whole.hi();
+            let halves = [(whole.lo(), middle), (middle, whole.hi())];
+            let [low, high] = halves.map(|(lo, hi)| {
+                let mut half = part.to_vec();
+                half[side] = Interval::new(lo, hi).ok()?;
+                Some(half)
+            });
+            Some([low?, high?]).filter(|_| is_inner)
+        };
+        let narrowed = (0..part.len()).filter_map(|side| {
+            let halves = cut(side)?;
+            Some((self.spread(field, &halves[0]), halves))
+        });
+        let least = narrowed.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(least.1)
+    }
+
+    /// How far A goes on a part, or where it has derivatives how far from a plane.
+    fn spread(&self, field: &Field<'_>, part: &[Interval]) -> f64 {
+        let Some(slopes) = field.slopes else {
+            return self.width(&(field.on)(part));
+        };
+        let each = slopes(part).into_iter().zip(part);
+        each.map(|(slope, side)| (side.hi() - side.lo()) * self.width(&slope))
+            .sum()
+    }
+
+    fn width(&self, A: &IntervalMatrix) -> f64 {
+        let [rows, columns] = &self.weights;
+        let entries = A.iter().zip(rows).flat_map(|(row, weight)| {
+            let row = row.iter().zip(columns);
+            row.map(move |(a, column)| (a.hi() - a.lo()) * weight * column)
+        });
+        entries.sum()
+    }
+}
+
+/// Proofs for a field, from the points that earlier ones failed at.
+struct Search<'a> {
+    field: &'a Field<'a>,
+    scale: &'a [f64],
+    budget: &'a Budget,
+    /// A at points of the box
+    models: Vec<ErrorModel>,
+    /// parts that may still be examined
+    left: usize,
+}
+
+impl<'a> Search<'a> {
+    fn new(field: &'a Field<'a>, scale: &'a [f64], budget: &'a Budget) -> Self {
+        let mut search = Self {
+            field,
+            scale,
+            budget,
+            models: vec![],
+            left: ALL_PARTS,
+        };
+        let middle = middle(&field.sides);
+        search.add(&middle);
+        let widths = field.sides.iter().map(|side| side.lo() < side.hi());
+        let wide: Vec<usize> = widths.enumerate().filter(|w| w.1).map(|w| w.0).collect();
+        let all = 1_usize.checked_shl(wide.len() as u32).unwrap_or(usize::MAX);
+        // of many corners some, spread
+        let stride = (all / CORNERS).max(1) | 1;
+        for k in 0..all.min(CORNERS) {
+            let corner = k.wrapping_mul(stride);
+            let mut point = middle.clone();
+            for (bit, &side) in wide.iter().enumerate() {
+                let ends = field.sides[side];
+                point[side] = match corner >> bit & 1 {
+                    0 => ends.lo(),
+                    _ => ends.hi(),
+                };
+            }
+            search.add(&point);
+        }
+        search
+    }
+
+    /// Whether A has a value there.
+    fn add(&mut self, point: &[f64]) -> bool {
+        let model = ErrorModel {
+            constant: (self.field.on)(&points_of(point)),
+            sectors: vec![],
+        };
+        let is_new = model.is_bounded() && !self.models.contains(&model);
+        if is_new {
+            self.models.push(model);
+        }
+        is_new
+    }
+
+    /// A proof at a rate, from the P of one that is faster.
+    fn prove(&mut self, rate: f64, limit: f64) -> Option<Together> {
+        let mut faster = MARGINS.iter().map(|share| rate + share * limit);
+        faster.find_map(|faster| self.prove_by(rate, faster))
+    }
+
+    fn prove_by(&mut self, rate: f64, faster: f64) -> Option<Together> {
+        for _ in 0..ADDED {
+            if self.left == 0 {
+                return None;
+            }
+            let found = prove(&self.models, self.scale, faster, self.budget)?;
+            match covered(self.field, (&found.P, rate), &mut self.left, self.budget) {
+                Covered::By(parts) => {
+                    let multipliers = vec![];
+                    let proof = Proof {
+                        rate,
+                        multipliers,
+                        ..found
+                    };
+                    return Some(Together { proof, parts });
+                }
+                Covered::Not(point) => {
+                    if !self.add(&point) {
+                        return None;
+                    }
+                }
+                Covered::Unknown => return None,
+            }
+        }
+        None
+    }
+}
+
+/// A proof of decay at `rate` on the box; none where none is found. Nothing decays faster than `limit`.
+pub fn prove_together(
+    field: &Field<'_>,
+    scale: &[f64],
+    (rate, limit): (f64, f64),
+    budget: &Budget,
+) -> Option<Together> {
+    Search::new(field, scale, budget).prove(rate, limit)
+}
+
+/// The fastest decay up to `limit` that is proved on the box, by bisection.
+pub fn fastest_together(
+    field: &Field<'_>,
+    scale: &[f64],
+    limit: f64,
+    budget: &Budget,
+) -> Option<Together> {
+    let mut search = Search::new(field, scale, budget);
+    let mut best = search.prove(NEGLIGIBLE * limit, limit)?;
+    let mut high = limit;
+    while best.proof.rate < high * (1.0 - ACCURACY) && budget.spent().is_none() {
+        let rate = match best.proof.rate < 0.1 * high {
+            true => (best.proof.rate * high).sqrt(),
+            false => f64::midpoint(best.proof.rate, high),
+        };
+        match search.prove(rate, limit) {
+            Some(found) => best = found,
+            None => high = rate,
+        }
+    }
+    Some(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn side(low: f64, high: f64) -> Interval {
+        Interval::new(low, high).unwrap()
+    }
+
+    /// e₁' = −e₁ + x e₂, e₂' = −x e₁ − e₂: of independent entries no P serves for |x| ≤ 5, but whatever x is, |e|² falls.
+    fn turning(part: &[Interval]) -> IntervalMatrix {
+        let x = part[0];
+        vec![vec![-Interval::ONE, x], vec![-x, -Interval::ONE]]
+    }
+
+    #[test]
+    fn what_turns_either_way_decays_by_its_own_damping() {
+        let field = Field {
+            on: &turning,
+            slopes: None,
+            sides: vec![side(-5.0, 5.0)],
+        };
+        let budget = Budget::default();
+        let found = fastest_together(&field, &[1.0, 1.0], 1.0, &budget).unwrap();
+        assert!(
+            found.proof.rate > (1.0 - ACCURACY) * (1.0 - 0.03),
+            "{found:?}"
+        );
+        let P = &found.proof.P;
+        assert!((P[(0, 0)] - P[(1, 1)]).abs() < 0.2 * P[(0, 0)], "{P}");
+        assert_eq!(
+            holds_together(&field, P, found.proof.rate, &budget),
+            Covered::By(found.parts)
+        );
+        // nothing decays faster than the trace says
+        assert!(matches!(
+            holds_together(&field, P, 1.01, &budget),
+            Covered::Not(_)
+        ));
+        assert_eq!(
+            prove_together(&field, &[1.0, 1.0], (1.01, 1.0), &budget),
+            None
+        );
+    }
+
+    /// The same matrices as two slopes that do not know of each other.
+    #[test]
+    fn apart_the_slopes_are_too_many() {
+        let sector = |column: usize, row: usize| {
+            let mut direction = vec![Interval::ZERO; 2];
+            direction[row] = Interval::ONE;
+            super::super::Sector {
+                column,
+                direction,
+                range: side(-5.0, 5.0),
+            }
+        };
+        let constant = square(2, |i, j| {
+            if i == j {
+                -Interval::ONE
+            } else {
+                Interval::ZERO
+            }
+        });
+        let model = ErrorModel {
+            constant,
+            sectors: vec![sector(1, 0), sector(0, 1)],
+        };
+        assert_eq!(prove(&[model], &[1.0, 1.0], 0.0, &Budget::default()), None);
+    }
+
+    /// A place where A is unstable is found however small it is beside the box, or at least nothing is said to hold.
+    #[test]
+    fn a_narrow_peak_is_not_passed_over() {
+        for place in [0.123_456, -3.3, 7.999] {
+            let peak = |part: &[Interval]| {
+                let away = (part[0] - Interval::point(place)) * Interval::point(200.0);
+                let bump = Interval::point(2.0) / (Interval::ONE + away.powi(2));
+                vec![vec![bump - Interval::ONE]]
+            };
+            let field = Field {
+                on: &peak,
+                slopes: None,
+                sides: vec![side(-8.0, 8.0)],
+            };
+            let P = DMatrix::identity(1, 1);
+            let found = holds_together(&field, &P, 0.0, &Budget::default());
+            assert!(!matches!(found, Covered::By(_)), "{place}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_form_that_is_none_holds_nowhere() {
+        let field = Field {
+            on: &turning,
+            slopes: None,
+            sides: vec![side(-1.0, 1.0)],
+        };
+        for P in [
+            DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]),
+            DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.0, 1.0]),
+            DMatrix::from_row_slice(2, 2, &[f64::NAN, 0.0, 0.0, 1.0]),
+        ] {
+            let found = holds_together(&field, &P, 0.1, &Budget::default());
+            assert!(matches!(found, Covered::Not(_)), "{P}");
+        }
+        let open = Field {
+            on: &turning,
+            slopes: None,
+            sides: vec![Interval::ENTIRE],
+        };
+        let found = holds_together(&open, &DMatrix::identity(2, 2), 0.1, &Budget::default());
+        assert!(!matches!(found, Covered::By(_)));
+    }
+}
