@@ -265,7 +265,7 @@ fn what_bends_or_jumps_is_enclosed() {
     let found = &sign.eval_in(&models, &[x])[0];
     for s in SHARES {
         for share in [0.0, 0.25, 0.5, 1.0] {
-            let value = share * -1.0 + (1.0 - share) * (s + 2.0);
+            let value = (1.0 - share) * (s + 2.0) - share;
             assert!(holds(found, &ring, &[s], 0.0, value));
         }
     }
