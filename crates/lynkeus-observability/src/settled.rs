@@ -78,6 +78,21 @@ fn side(variable: &Variable, own: Option<f64>) -> Dimension {
     Dimension::new(&*variable.name, variable.node, min, max)
 }
 
+/// Whether an operation has branches.
+fn may_choose(op: Op) -> bool {
+    match op {
+        Op::Unary(op, _) => matches!(
+            op,
+            Unary::Abs | Unary::Sign | Unary::Floor | Unary::Sqrt | Unary::Asin | Unary::Acos
+        ),
+        Op::Binary(op, ..) => matches!(
+            op,
+            Binary::Min | Binary::Max | Binary::Less | Binary::LessEq | Binary::Equal
+        ),
+        _ => false,
+    }
+}
+
 /// The declared box.
 struct Declared<'g> {
     graph: &'g Graph,
@@ -104,7 +119,9 @@ impl Declared<'_> {
     /// What stands for a node whose choice is the same on the whole box.
     fn made(&self, node: Node, images: &HashMap<Node, Node>) -> Option<Node> {
         let graph = self.graph;
-        if graph.symbols_of(&[node]).is_empty() {
+        // most nodes choose nothing, and what a node reads takes a walk
+        let chooses = may_choose(graph.op(node));
+        if !chooses || graph.budget().spent().is_some() || graph.symbols_of(&[node]).is_empty() {
             return None;
         }
         let constant = |value: f64| graph.constant(value).node();
