@@ -75,13 +75,7 @@ pub(super) const SECTIONS: [KeySpec; 14] = [
     },
     KeySpec {
         name: "box",
-        shape: Shape::As(
-            "table: name = number, or `[smallest, largest]`",
-            &Shape::Table(&Shape::Either(&[
-                Shape::Number,
-                Shape::List(&Shape::Number),
-            ])),
-        ),
+        shape: RANGES,
         default: "none",
         meaning: "ranges narrower than the model's `min` and `max`",
     },
@@ -313,6 +307,15 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
     },
 ];
 
+/// Ranges by name.
+const RANGES: Shape = Shape::As(
+    "table: name = number, or `[smallest, largest]`",
+    &Shape::Table(&Shape::Either(&[
+        Shape::Number,
+        Shape::List(&Shape::Number),
+    ])),
+);
+
 /// `[certify]`
 pub(super) const CERTIFY: [KeySpec; 5] = [
     KeySpec {
@@ -323,13 +326,7 @@ pub(super) const CERTIFY: [KeySpec; 5] = [
     },
     KeySpec {
         name: "start",
-        shape: Shape::As(
-            "table: name = number, or `[smallest, largest]`",
-            &Shape::Table(&Shape::Either(&[
-                Shape::Number,
-                Shape::List(&Shape::Number),
-            ])),
-        ),
+        shape: RANGES,
         default: "none",
         meaning: "from where the plant starts: ranges of states, and of unknown inputs that stay constant. `certify` then proves or refutes that [the plant stays in the box](certificates.md#the-plant-stays-in-the-box) until `until`; a state that is not listed starts where the simulation starts",
     },

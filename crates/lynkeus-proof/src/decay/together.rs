@@ -178,7 +178,13 @@ impl Form {
         let n = center.len();
         let around = |side: &Interval| *side - Interval::point(side.midpoint());
         let mut reach: Vec<(f64, usize)> = (0..part.len())
-            .map(|k| (around(&part[k]).magnitude() * self.width_of(&slopes[k]), k))
+            .map(|k| {
+                (
+                    around(&part[k]).magnitude()
+                        * self.weighed(&slopes[k], |slope| slope.magnitude()),
+                    k,
+                )
+            })
             .filter(|(size, _)| *size != 0.0)
             .collect();
         reach.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -224,16 +230,6 @@ impl Form {
         })
     }
 
-    /// How large it is, as it counts.
-    fn width_of(&self, A: &IntervalMatrix) -> f64 {
-        let [rows, columns] = &self.weights;
-        let entries = A.iter().zip(rows).flat_map(|(row, weight)| {
-            let row = row.iter().zip(columns);
-            row.map(move |(a, column)| a.magnitude() * weight * column)
-        });
-        entries.sum()
-    }
-
     /// The part cut in two where that helps most; none where it cannot be cut.
     fn halves(&self, field: &Field<'_>, part: &[Interval]) -> Option<[Vec<Interval>; 2]> {
         let cut = |side: usize| {
@@ -258,20 +254,23 @@ impl Form {
     /// How far A goes on a part, or where it has derivatives how far from a plane.
     fn spread(&self, field: &Field<'_>, part: &[Interval]) -> f64 {
         let Some(slopes) = field.slopes else {
-            return self.width(&(field.on)(part));
+            return self.weighed(&(field.on)(part), |entry| entry.width());
         };
         let each = slopes(part).into_iter().zip(part);
-        each.map(|(slope, side)| (side.hi() - side.lo()) * self.width(&slope))
+        each.map(|(slope, side)| side.width() * self.weighed(&slope, |slope| slope.width()))
             .sum()
     }
 
-    fn width(&self, A: &IntervalMatrix) -> f64 {
+    /// The sum of what entries have, as they count.
+    fn weighed(&self, A: &IntervalMatrix, size: impl Fn(&Interval) -> f64) -> f64 {
         let [rows, columns] = &self.weights;
-        let entries = A.iter().zip(rows).flat_map(|(row, weight)| {
-            let row = row.iter().zip(columns);
-            row.map(move |(a, column)| (a.hi() - a.lo()) * weight * column)
-        });
-        entries.sum()
+        let mut sum = 0.0;
+        for (row, weight) in A.iter().zip(rows) {
+            for (entry, column) in row.iter().zip(columns) {
+                sum += size(entry) * weight * column;
+            }
+        }
+        sum
     }
 }
 

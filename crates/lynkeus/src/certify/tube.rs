@@ -122,12 +122,8 @@ impl Tube {
         };
         let question = Question::of(prepared, place, start)?;
         let budget = place.graph().budget();
-        let mut found = question.answered(&budget);
+        let mut found = question.answered(excluded(prepared), &budget);
         found.notes = notes(prepared);
-        if let Some(obstacle) = excluded(prepared) {
-            (found.verdict, found.obstacle, found.witness) =
-                (Standing::Undecided, Some(obstacle), None);
-        }
         Ok(Some(found))
     }
 }
@@ -135,8 +131,16 @@ impl Tube {
 /// What no tube here can count.
 fn excluded(prepared: &Prepared<'_>) -> Option<String> {
     let plant = prepared.plant();
+    let delay = plant.delays.first().map(|delay| {
+        format!(
+            "{} is held by {} states, which are not all of the delay: nothing is proved of the plant",
+            delay.text, delay.count
+        )
+    });
     let jumps = !plant.whens.is_empty();
-    jumps.then(|| "the plant's states jump at events (`when`), which no tube follows".to_owned())
+    let jumps = jumps
+        .then(|| "the plant's states jump at events (`when`), which no tube follows".to_owned());
+    delay.or(jumps)
 }
 
 /// What a tube leaves aside.
@@ -232,7 +236,7 @@ impl Question {
         ))
     }
 
-    fn answered(&self, budget: &Budget) -> Tube {
+    fn answered(&self, excluded: Option<String>, budget: &Budget) -> Tube {
         let named = |variables: &[Variable], ranges: &[Interval]| -> Ranges {
             let names = variables.iter().map(|v| v.name.clone());
             names.zip(ranges.iter().copied()).collect()
@@ -249,7 +253,7 @@ impl Question {
             range: named(&self.states, &problem.start),
             end: named(&self.states, &problem.start),
             rows: vec![],
-            obstacle: self.unbounded(),
+            obstacle: excluded.or_else(|| self.unbounded()),
             witness: None,
             notes: vec![],
         };

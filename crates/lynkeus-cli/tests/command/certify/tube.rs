@@ -114,3 +114,32 @@ fn what_is_not_understood() {
         &["`start` of [certify] needs `until`"],
     );
 }
+
+/// What holds a delay is not all of it, and a tube follows no jump: neither is proved to stay, or to leave.
+#[test]
+fn what_a_tube_does_not_follow_is_undecided() {
+    for (equations, why) in [
+        (
+            "der(x) = delay(u, 0.5) - x;",
+            "which are not all of the delay",
+        ),
+        (
+            "der(x) = u - x; when x > 0.9 then reinit(x, 0); end when;",
+            "jump at events",
+        ),
+    ] {
+        let folder = Folder::empty();
+        let model = format!(
+            "model P input Real u(min = 0, max = 1); Real x(start = 0.5, min = -1, max = 3); output Real y = x; equation {equations} end P;"
+        );
+        folder.write("p.mo", &model);
+        let study = "plant = \"p.mo\"\n[sensors]\nnoise = { y = 0.1 }\n[observer]\nfamily = \"ekf\"\n[certify]\nstart = { x = [0.2, 0.8] }\nuntil = 3\n";
+        folder.write("study.toml", study);
+        let found = tube(&folder);
+        assert_eq!(found["verdict"], "undecided", "{found}");
+        let obstacle = found["obstacle"].as_str().unwrap();
+        assert!(obstacle.contains(why), "{obstacle}");
+        assert_eq!(found["reached"], 0.0, "{found}");
+        assert!(found["rows"].as_array().unwrap().is_empty(), "{found}");
+    }
+}
