@@ -90,6 +90,13 @@ pub struct Coupling {
     pub factor: String,
 }
 
+/// From where the plant may start, and until when it is asked to stay in the box.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    pub start: Vec<Side>,
+    pub until: f64,
+}
+
 #[derive(Clone, Debug)]
 pub struct Case {
     pub kind: Kind,
@@ -104,6 +111,8 @@ pub struct Case {
     pub noise: Vec<f64>,
     /// the bound of the known inputs' derivatives, where the study declares one
     pub slope: Option<f64>,
+    /// what is asked about its tube
+    pub tube: Option<Asked>,
     /// key and value of `[observer]`
     pub observer: Vec<(String, String)>,
 }
@@ -196,8 +205,20 @@ impl Case {
             _ => None,
         });
         let slew: Vec<String> = slew.collect();
+        if !slew.is_empty() || self.tube.is_some() {
+            text += "\n[certify]\n";
+        }
         if !slew.is_empty() {
-            _ = writeln!(text, "\n[certify]\nslew = {{ {} }}", slew.join(", "));
+            _ = writeln!(text, "slew = {{ {} }}", slew.join(", "));
+        }
+        if let Some(Asked { start, until }) = &self.tube {
+            let range = |s: &Side| format!("{} = [{:?}, {:?}]", s.name, s.low, s.high);
+            let start: Vec<String> = start.iter().map(range).collect();
+            _ = writeln!(
+                text,
+                "start = {{ {} }}\nuntil = {until:?}",
+                start.join(", ")
+            );
         }
         text
     }

@@ -1,8 +1,10 @@
 //! What the library says about a case: every claim that can be attacked. The only file
 //! that knows what certificates look like.
 
+use lynkeus::Tube;
+use lynkeus::observers::guarantee::Said;
 use lynkeus::observers::{
-    Certificate, Check, Examination, FAMILIES, Statement, Tuning, UltimateBound,
+    Certificate, Check, Examination, FAMILIES, Reason, Statement, Tuning, UltimateBound,
 };
 use lynkeus::prepare::{Prepared, StudyDesign};
 use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
@@ -44,6 +46,8 @@ pub struct Findings {
     pub claims: Vec<Claim>,
     /// for samples, with the longest interval between them
     pub sampled: Option<(Claim, f64)>,
+    /// where the plant is from the starts that the study asks about
+    pub tube: Option<Tube>,
     pub refutations: Vec<Refutation>,
     /// the family that the study asks for
     pub examination: Option<Examination>,
@@ -92,6 +96,7 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
         };
         Some((claim, longest.interval))
     });
+    found.tube = report.tube;
     found.certified(report.certificate, true);
     if let Some(theorem) = report.theorem {
         found.certified(theorem, false);
@@ -113,6 +118,7 @@ impl Findings {
             design: None,
             claims: vec![],
             sampled: None,
+            tube: None,
             refutations: vec![],
             examination: examinations.ok().and_then(|all| all.last().cloned()),
             contradicts: false,
@@ -147,7 +153,10 @@ impl Findings {
 
     fn certified(&mut self, certificate: Certificate, of_error: bool) {
         match certificate.verdict() {
-            Standing::Proved => self.counts.proved += 1,
+            Standing::Proved => {
+                self.counts.proved += 1;
+                self.counts.together += usize::from(is_together(&certificate));
+            }
             Standing::Undecided => self.counts.undecided += 1,
             Standing::Refuted => self.counts.refuted += 1,
         }
@@ -174,6 +183,14 @@ impl Findings {
             }
         }
     }
+}
+
+/// Whether it takes the slopes as they are together at each point.
+fn is_together(certificate: &Certificate) -> bool {
+    certificate.hypotheses.iter().any(|check| {
+        let said = &check.reason;
+        matches!(said, Reason::Guarantee(Said::HoldsTogether { .. }))
+    })
 }
 
 fn claim(certificate: &Certificate) -> Option<Claim> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use lynkeus::Study;
 use lynkeus::observers::Observer;
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::{AugmentedPlant, range};
+use lynkeus::structure::{AugmentedPlant, Standing, range};
 
 use super::attack::Attack;
 use super::case::{Case, Kind, Role};
@@ -15,6 +15,7 @@ use super::pair::Pair;
 use super::refute;
 use super::retune;
 use super::tally::Counts;
+use super::tube;
 use crate::numbers::Numbers;
 
 /// What kind of claim turned out to be false.
@@ -30,6 +31,8 @@ pub enum Flaw {
     Contradiction,
     /// the gain that is printed is not the observer's
     Gain,
+    /// a run leaves the tube, or the witness of one that leaves the box does not
+    Tube,
     /// a witness that shows nothing
     Witness,
     /// the library panics
@@ -160,6 +163,7 @@ impl Look<'_, '_> {
             self.against_claims(&design.observer, numbers);
             self.against_samples(&design.observer, numbers);
         }
+        self.against_tube(numbers);
         if self.effort.facts && self.found.fits() {
             self.against_facts(numbers);
         }
@@ -235,6 +239,30 @@ impl Look<'_, '_> {
         if worst.ratio > 1.0 + 1e-4 {
             let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);
             self.note(Flaw::Exceeded, evidence);
+        }
+    }
+
+    /// Runs of the plant alone, with everything that is declared.
+    fn against_tube(&mut self, numbers: &mut Numbers) {
+        let Some(tube) = &self.found.tube else {
+            return;
+        };
+        let Ok(mut attack) = tube::Attack::new(self.case, tube, self.augmented.plant) else {
+            return self.note(Flaw::Tube, "the plant reads what nobody knows".into());
+        };
+        if let Some(evidence) = attack.misled() {
+            self.note(Flaw::Tube, evidence);
+        }
+        if tube.reached <= tube.from {
+            return;
+        }
+        let worst = attack.search(numbers, self.effort.runs);
+        if worst.is_whole {
+            self.counts.tubes += 1;
+            self.counts.stay += usize::from(tube.verdict == Standing::Proved);
+        }
+        if worst.ratio > 1.0 {
+            self.note(Flaw::Tube, worst.what);
         }
     }
 

@@ -20,6 +20,7 @@ mod signals;
 mod tally;
 #[cfg(test)]
 mod tests;
+mod tube;
 
 use std::path::Path;
 use std::sync::Mutex;

@@ -81,6 +81,18 @@ fn simpler(case: &Case) -> Vec<Case> {
             cases.push(less);
         }
     }
+    if let Some(tube) = &case.tube {
+        let mut less = case.clone();
+        less.tube = None;
+        cases.push(less);
+        for i in 0..tube.start.len() {
+            let mut less = case.clone();
+            if let Some(tube) = &mut less.tube {
+                tube.start.remove(i);
+            }
+            cases.push(less);
+        }
+    }
     for (key, _) in &case.observer {
         if !["family", "theta", "poles", "gain", "rate"].contains(&key.as_str()) {
             let mut less = case.clone();

@@ -21,6 +21,11 @@ pub struct Counts {
     pub followed: usize,
     /// proofs for samples that were attacked
     pub sampled: usize,
+    /// proofs that take the slopes as they are together
+    pub together: usize,
+    /// tubes that were attacked, and those of them that stay in the box
+    pub tubes: usize,
+    pub stay: usize,
     /// cases with a violation
     pub violated: usize,
     /// refutations re-evaluated, and those found wrong
@@ -42,6 +47,9 @@ impl Counts {
         self.refuted += other.refuted;
         self.followed += other.followed;
         self.sampled += other.sampled;
+        self.together += other.together;
+        self.tubes += other.tubes;
+        self.stay += other.stay;
         self.violated += other.violated;
         self.refutations += other.refutations;
         self.wrong += other.wrong;
@@ -66,8 +74,8 @@ impl Tally {
 
     /// A table in Markdown.
     pub fn table(&self) -> String {
-        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | violated | witnesses checked | wrong |\n\
-                        |---|---|---|---|---|---|---|---|---|---|---|---|\n"
+        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | tubes | that stay | violated | witnesses checked | wrong |\n\
+                        |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
         let rows = self.0.iter().map(|(kind, counts)| (kind.word(), counts));
         let total = self.total();
@@ -81,6 +89,9 @@ impl Tally {
                 c.refuted,
                 c.followed,
                 c.sampled,
+                c.together,
+                c.tubes,
+                c.stay,
                 c.violated,
                 c.refutations,
                 c.wrong,

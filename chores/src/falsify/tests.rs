@@ -3,15 +3,17 @@
 
 use nalgebra::DMatrix;
 
-use super::case::{Case, Input, Kind, Role, Side};
+use super::case::{Asked, Case, Input, Kind, Role, Side};
 use super::claims::Claim;
 use super::facts::{Fact, Facts};
 use super::judge::{Desk, attack};
 use super::pair::Pair;
 use super::report::Options;
 use crate::numbers::Numbers;
-use lynkeus::Study;
+use lynkeus::expr::Interval;
 use lynkeus::prepare::Prepared;
+use lynkeus::structure::Standing;
+use lynkeus::{Study, Tube, Witness};
 
 fn side(name: &str, low: f64, high: f64) -> Side {
     Side {
@@ -39,6 +41,7 @@ fn case(term: &str) -> Case {
         outputs: vec![vec!["x1".into(), "d".into()]],
         noise: vec![0.0],
         slope: None,
+        tube: None,
         observer: vec![],
     };
     case.key("family", "\"triangular\"");
@@ -152,6 +155,67 @@ fn what_a_plant_does_is_seen_by_its_values() {
     assert_eq!(found, [None, None]);
 }
 
+/// What is seen of runs of a pendulum with a push, beside its tube with other numbers in it.
+fn seen(name: &str, change: impl FnOnce(&mut Tube)) -> (f64, Option<String>) {
+    let mut case = case("-sin(3*x1) + d");
+    case.tube = Some(Asked {
+        start: vec![side("x1", 0.4, 0.7), side("x2", -0.1, 0.1)],
+        until: 3.0,
+    });
+    let folder = std::env::temp_dir().join(format!("lynkeus-{name}-{}", std::process::id()));
+    let desk = Desk::new(&folder).unwrap();
+    let study = Study::load(desk.write(&case).unwrap()).unwrap();
+    let plant = lynkeus::prepare::plant(&study).unwrap();
+    let mut tube = lynkeus::certify(&study).unwrap().tube.unwrap();
+    change(&mut tube);
+    let mut attack = super::tube::Attack::new(&case, &tube, &plant).unwrap();
+    let found = (
+        attack.search(&mut Numbers::new(5, 0), 60).ratio,
+        attack.misled(),
+    );
+    std::fs::remove_dir_all(folder).unwrap();
+    found
+}
+
+/// Half of a range, about its middle.
+fn narrower(range: &mut Interval) {
+    let (middle, half) = (range.midpoint(), 0.25 * range.width());
+    *range = Interval::new(middle - half, middle + half).unwrap();
+}
+
+#[test]
+fn runs_leave_a_tube_that_is_too_narrow() {
+    let (ratio, misled) = seen("tube", |tube| assert_eq!(tube.verdict, Standing::Proved));
+    assert!(
+        ratio <= 1.0 && ratio > 0.9 && misled.is_none(),
+        "{ratio} {misled:?}"
+    );
+    let one_row = |tube: &mut Tube| tube.rows[60].2.iter_mut().for_each(narrower);
+    let end = |tube: &mut Tube| tube.end.iter_mut().for_each(|(_, range)| narrower(range));
+    let late = |tube: &mut Tube| tube.rows.drain(150..).for_each(drop);
+    assert!(seen("row", one_row).0 > 1.0);
+    assert!(seen("end", end).0 > 1.0);
+    assert!(seen("late", late).0 > 1.0);
+}
+
+#[test]
+fn a_witness_that_shows_nothing_is_found() {
+    let with = |state: &str, time: f64, value: [f64; 2], x1: f64| {
+        let at = [("x1", x1), ("x2", 0.0), ("d", 0.1)];
+        let witness = Witness {
+            at: at.map(|(name, x)| (name.to_owned(), x)).into(),
+            state: state.into(),
+            time,
+            value,
+        };
+        seen("witness", |tube| tube.witness = Some(witness)).1
+    };
+    // not outside, not there, from elsewhere
+    for (value, x1) in [([-1.0, 1.0], 0.5), ([2.1, 2.2], 0.5), ([-1.0, 1.0], 0.9)] {
+        assert!(with("x1", 1.0, value, x1).is_some(), "{value:?}");
+    }
+}
+
 /// The same search as `cargo xtask falsify`, short.
 #[test]
 fn a_short_search_finds_no_false_claim() {
@@ -174,6 +238,10 @@ fn a_short_search_finds_no_false_claim() {
     assert!(total.proved as u64 > PLANTS / 4, "{total:?}");
     assert!(2 * total.followed > total.proved, "{total:?}");
     assert!(total.sampled > 0, "{total:?}");
+    assert!(
+        total.stay as u64 > PLANTS / 20 && total.stay < total.tubes,
+        "{total:?}"
+    );
     assert!(total.refutations as u64 > PLANTS / 30, "{total:?}");
     std::fs::remove_dir_all(folder).unwrap();
 }

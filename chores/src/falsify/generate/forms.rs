@@ -236,6 +236,7 @@ fn case(
         couplings: vec![],
         outputs,
         slope: None,
+        tube: None,
         observer: vec![],
     }
 }

@@ -5,7 +5,7 @@ mod implicit;
 mod settings;
 mod terms;
 
-use super::case::{Case, Input, Kind, Role, Side, number};
+use super::case::{Asked, Case, Input, Kind, Role, Side, number};
 use crate::numbers::Numbers;
 use terms::{Reads, round};
 
@@ -27,7 +27,40 @@ pub fn case(numbers: &mut Numbers, kind: Kind) -> Case {
     draft.hostile(&mut case);
     draft.implicit(&mut case);
     settings::choose(draft.numbers, &mut case);
+    if draft.numbers.chance(TUBES) {
+        case.tube = Some(asked(draft.numbers, &case));
+    }
     case
+}
+
+/// The share of the studies that ask for a tube.
+const TUBES: f64 = 0.3;
+
+/// Where the plant may start, about the middle of the box, and for how long: unknown constants where they are declared,
+/// or in a part of that.
+fn asked(numbers: &mut Numbers, case: &Case) -> Asked {
+    let share = numbers.size(1e-3, 0.4);
+    let is_constant = |input: &&Input| input.role == Role::Unknown(None) && input.declared;
+    let constants = case.inputs.iter().filter(is_constant).map(|i| &i.side);
+    let constants: Vec<&Side> = constants.filter(|_| numbers.chance(0.5)).collect();
+    let mut part = |side: &Side| {
+        let wide = match numbers.below(4) {
+            0 => 0.0,
+            _ => share * numbers.unit() * side.width(),
+        };
+        let middle = side.middle() + 0.3 * numbers.between(-1.0, 1.0) * side.width();
+        let within = |x: f64| x.clamp(side.low, side.high);
+        Side {
+            name: side.name.clone(),
+            low: within(middle - 0.5 * wide),
+            high: within(middle + 0.5 * wide),
+        }
+    };
+    let start = case.states.iter().chain(constants).map(&mut part).collect();
+    Asked {
+        start,
+        until: round(numbers.size(0.1, 8.0)),
+    }
 }
 
 /// How rough a plant is.
@@ -52,9 +85,11 @@ impl<'n> Draft<'n> {
             12..15 => Manner::Kinked,
             _ => Manner::Hostile,
         };
-        let strength = match numbers.chance(0.04) {
-            true => numbers.size(1e-7, 1e3),
-            false => numbers.size(0.004, 0.5),
+        // strong ones are often stable where their slopes are not at their worst all at once
+        let strength = match numbers.unit() {
+            0.0..0.04 => numbers.size(1e-7, 1e3),
+            0.04..0.2 => numbers.size(0.5, 5.0),
+            _ => numbers.size(0.004, 0.5),
         };
         Self {
             numbers,
