@@ -106,6 +106,9 @@ struct Task<'a> {
     tuning: Tuning,
 }
 
+/// A decay so many times faster for the study's own inputs is preferred to one for all that are declared.
+const MUCH: f64 = 10.0;
+
 /// Steps of the search for the widest ranges of the inputs.
 const HALVINGS: usize = 5;
 
@@ -125,13 +128,13 @@ impl<'a> Task<'a> {
         let mut place = &declared;
         let mut certificate = self.certificate(&declared, &design, claim)?;
         let mut notes = vec![];
-        if let Some(simulated) = &simulated
-            && certificate.verdict() != Standing::Proved
-        {
-            let wide = certificate.verdict();
-            certificate = self.certificate(simulated, &design, claim)?;
-            notes.push(self.reach(&design, &certificate, wide)?);
-            place = simulated;
+        if let Some(simulated) = &simulated {
+            let narrow = self.certificate(simulated, &design, claim)?;
+            if certificate.verdict() != Standing::Proved || is_much_faster(&narrow, &certificate) {
+                let wide = std::mem::replace(&mut certificate, narrow);
+                notes.push(self.reach(&design, &certificate, &wide)?);
+                place = simulated;
+            }
         }
         // a limit that has a say in the family is no note of a proof only
         if let Some(choice) = self.prepared.choice()?.filter(|c| c.ended.is_some()) {
@@ -246,7 +249,7 @@ impl<'a> Task<'a> {
         &self,
         design: &Design,
         proved: &Certificate,
-        wide: Standing,
+        wide: &Certificate,
     ) -> Result<String, Error> {
         let words = |ranges: &[(String, f64, f64)]| {
             let sides = ranges
@@ -254,10 +257,14 @@ impl<'a> Task<'a> {
                 .map(|(n, low, high)| words::side(n, *low, *high));
             sides.collect::<Vec<_>>().join(", ")
         };
+        let slower = match (wide.verdict(), wide.rate) {
+            (Standing::Proved, Some(rate)) => format!(", at {}", words::number(rate)),
+            _ => String::new(),
+        };
         let simulated = format!(
-            "for the inputs of [simulate], {}; on their declared ranges: {}",
+            "for the inputs of [simulate], {}; on their declared ranges: {}{slower}",
             words(&self.inputs),
-            wide.word()
+            wide.verdict().word()
         );
         let Some(rate) = proved.rate.filter(|_| self.explore) else {
             return Ok(simulated);
@@ -281,6 +288,12 @@ impl<'a> Task<'a> {
             false => simulated,
         })
     }
+}
+
+/// Whether a proof on less makes so much of a difference that it is the answer.
+fn is_much_faster(narrow: &Certificate, wide: &Certificate) -> bool {
+    let rates = narrow.rate.zip(wide.rate);
+    rates.is_some_and(|(narrow, wide)| narrow > MUCH * wide)
 }
 
 /// What a certificate counts.

@@ -18,6 +18,14 @@ use crate::Observer;
 /// Numbers that A may depend on: the work grows with the power of them.
 const SIDES: usize = 10;
 
+/// The rate that a proof is sought for.
+pub(super) enum Wanted {
+    /// the fastest, but not a slower one than this
+    From(f64),
+    /// this one
+    At(f64),
+}
+
 /// A at every point of a box.
 struct Joint {
     /// row by row
@@ -29,12 +37,12 @@ struct Joint {
     size: usize,
 }
 
-/// A proof that takes the slopes together, of decay at a rate or at the fastest one up to a limit.
+/// A proof that takes the slopes together, of decay at a rate, or at the fastest one from a least one up to a limit.
 pub(super) fn together(
     augmented: &AugmentedPlant<'_>,
     observer: &Observer,
     system: &ErrorSystem,
-    (rate, limit): (Option<f64>, f64),
+    (wanted, limit): (Wanted, f64),
     budget: &Budget,
 ) -> Result<Option<Together>, MissingInput> {
     let Some(joint) = Joint::new(augmented, observer, &system.region)? else {
@@ -47,9 +55,10 @@ pub(super) fn together(
         slopes: joint.slopes.is_some().then_some(&slopes),
         sides: joint.sides.clone(),
     };
-    Ok(match rate {
-        None => fastest_together(&field, &system.scale, limit, budget),
-        Some(rate) => prove_together(&field, &system.scale, (rate, limit), budget),
+    let scale = &system.scale;
+    Ok(match wanted {
+        Wanted::From(least) => fastest_together(&field, scale, (least, limit), budget),
+        Wanted::At(rate) => prove_together(&field, scale, (rate, limit), budget),
     })
 }
 

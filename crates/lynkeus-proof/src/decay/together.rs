@@ -373,15 +373,15 @@ pub fn prove_together(
     Search::new(field, scale, budget).prove(rate, limit)
 }
 
-/// The fastest decay up to `limit` that is proved on the box, by bisection.
+/// The fastest decay from a rate up to `limit` that is proved on the box, by bisection; none where nothing that fast is.
 pub fn fastest_together(
     field: &Field<'_>,
     scale: &[f64],
-    limit: f64,
+    (least, limit): (f64, f64),
     budget: &Budget,
 ) -> Option<Together> {
     let mut search = Search::new(field, scale, budget);
-    let mut best = search.prove(NEGLIGIBLE * limit, limit)?;
+    let mut best = search.prove(least.max(NEGLIGIBLE * limit), limit)?;
     let mut high = limit;
     while best.proof.rate < high * (1.0 - ACCURACY) && budget.spent().is_none() {
         let rate = match best.proof.rate < 0.1 * high {
@@ -418,7 +418,7 @@ mod tests {
             sides: vec![side(-5.0, 5.0)],
         };
         let budget = Budget::default();
-        let found = fastest_together(&field, &[1.0, 1.0], 1.0, &budget).unwrap();
+        let found = fastest_together(&field, &[1.0, 1.0], (0.0, 1.0), &budget).unwrap();
         assert!(
             found.proof.rate > (1.0 - ACCURACY) * (1.0 - 0.03),
             "{found:?}"
