@@ -261,6 +261,11 @@ pub(super) struct Apart {
 }
 
 impl Apart {
+    /// The symbols of the innovations.
+    pub fn errors(&self) -> Vec<Node> {
+        self.read.iter().map(|(_, own)| own.symbol).collect()
+    }
+
     pub fn new(
         augmented: &AugmentedPlant<'_>,
         observer: &Observer,

@@ -18,18 +18,22 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Budget, Interval, MissingInput, Node};
 use lynkeus_gain::sampling::SampledError;
-use lynkeus_proof::decay::{self, ErrorModel, SampledProof, Sector};
+use lynkeus_proof::decay::{self, ErrorModel, Field, SampledProof, Samples, Sector};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Dimension, Innovation, Slopes, range};
 use nalgebra::DMatrix;
 
 use super::error_system::{Apart, expanded, readings, seen_by, size};
 use super::said::Said;
+use super::together::Joint;
 use super::{Claim, SEARCH, certify, finite_bounds, spread};
 use crate::{Assumptions, Bounds, DesignError, Observer};
 
 /// The share of the rate with continuous sensors at which the longest interval is sought.
 const SLOW: f64 = 0.01;
+
+/// Slopes are taken together where that makes the interval this much longer.
+const LONGER: f64 = 1.2;
 
 /// How often what lies between that rate and the continuous one is halved, for given samples.
 const HALVINGS: usize = 5;
@@ -41,8 +45,10 @@ pub struct SampledDecay {
     pub longest: AtSamples,
     /// for the samples that were asked about; none where these are not proved
     pub at: Option<AtSamples>,
-    /// from how long equal intervals on the error grows where slopes stay at an end of their ranges; infinite where it
-    /// was not seen to grow: what no proof that counts every slope of the ranges can reach
+    /// whether slopes count as they are together at each point of the box, or apart
+    pub together: bool,
+    /// from how long equal intervals on the error grows where slopes stay at an end of their ranges, or as they are at
+    /// a point of the box; infinite where it was not seen to grow: what no proof of its kind can reach
     pub broken: f64,
     /// for readings that are held from one to the next of those; none where nothing bounds what they leave
     pub held: Option<AtSamples>,
@@ -99,6 +105,8 @@ pub fn between_samples(
 /// (e, σ)' = 𝒜(θ) (e, σ) with what the proofs need.
 struct SampledSystem {
     models: Vec<ErrorModel>,
+    /// 𝒜 over (e, w − y) at every point of the box, where it depends on few numbers
+    joint: Option<Joint>,
     /// per sensor: the state that it shows
     shown: Vec<usize>,
     /// per sensor: |c| of y = c·x + d
@@ -138,7 +146,9 @@ impl SampledSystem {
             slopes.push(slope);
         }
         let models = models(augmented, observer, assumptions, &shown)?;
+        let region = seen_by(augmented, observer, assumptions)?;
         Ok(Ok(Self {
+            joint: Joint::sampled(augmented, observer, &region, (&shown, &slopes))?,
             models: models
                 .iter()
                 .map(|m| folded(m, n, &shown, &slopes))
@@ -157,8 +167,14 @@ impl SampledSystem {
         interval: Option<f64>,
     ) -> Result<SampledDecay, Said> {
         let search = augmented.graph().budget().part(SEARCH);
-        let longest = self.longest(continuous * SLOW, &search);
-        let longest = longest.ok_or_else(|| {
+        let found = match &self.joint {
+            None => Found {
+                longest: self.longest(continuous * SLOW, &search),
+                ..Found::default()
+            },
+            Some(joint) => joint.field(|field| self.together(field, continuous, interval, &search)),
+        };
+        let longest = found.longest.ok_or_else(|| {
             let spent = search.marked().map(Said::LongerSought);
             spent.unwrap_or(Said::NoInterval)
         })?;
@@ -171,27 +187,63 @@ impl SampledSystem {
             ultimate: self.ultimate(augmented, assumptions, proof, interval),
         };
         let at = asked.map(|interval| {
-            let proof = self.fastest(interval, continuous, &longest, &search);
+            let apart = |rate: f64| self.proof(interval, rate, &search);
+            let proof = found
+                .at
+                .unwrap_or_else(|| fastest(&longest, continuous, &search, apart));
             proved(interval, &proof)
         });
         Ok(SampledDecay {
             longest: proved(longest.interval, &longest),
             at,
-            broken: self.broken(),
+            together: found.broken.is_some(),
+            broken: found.broken.unwrap_or_else(|| self.broken(&self.models)),
             held: None,
             spent: search.marked().map(Said::LongerSought),
         })
     }
 
+    /// What is proved with the slopes together, where that reaches further than apart.
+    fn together(
+        &self,
+        field: &Field<'_>,
+        continuous: f64,
+        interval: Option<f64>,
+        search: &Budget,
+    ) -> Found {
+        let apart = self.longest(continuous * SLOW, search);
+        let least = apart.as_ref().map(|proof| LONGER * proof.interval);
+        let mut samples = Samples::new(field, (&self.shown, &self.scale), continuous, search);
+        let Some(longest) = samples.longest(continuous * SLOW, least) else {
+            return Found {
+                longest: apart,
+                ..Found::default()
+            };
+        };
+        let asked = interval.filter(|interval| *interval <= longest.interval);
+        samples.replenish();
+        let at = asked.map(|interval| {
+            fastest(&longest, continuous, search, |rate| {
+                let apart = self.proof(interval, rate, search);
+                apart.or_else(|| samples.prove(interval, rate))
+            })
+        });
+        Found {
+            at,
+            broken: Some(self.broken(samples.models())),
+            longest: Some(longest),
+        }
+    }
+
     /// The shortest interval at which slopes that stay at their ends let the error grow from sample to sample.
-    fn broken(&self) -> f64 {
+    fn broken(&self, models: &[ErrorModel]) -> f64 {
         let n = self.scale.len();
         let mut C = DMatrix::zeros(self.shown.len(), n);
         for (j, &state) in self.shown.iter().enumerate() {
             C[(j, state)] = 1.0;
         }
         let S = decay::between_errors(n + self.shown.len(), &self.shown);
-        let ends = self.models.iter().flat_map(|model| {
+        let ends = models.iter().flat_map(|model| {
             let low = model.sectors.iter().map(|s| s.range.lo()).collect();
             let high = model.sectors.iter().map(|s| s.range.hi()).collect();
             [low, high, model.middles()].map(|θ: Vec<f64>| &S * model.at(&θ) * &S)
@@ -208,29 +260,6 @@ impl SampledSystem {
 
     fn longest(&self, rate: f64, budget: &Budget) -> Option<SampledProof> {
         decay::longest(&self.models, &self.shown, &self.scale, rate, budget)
-    }
-
-    /// The fastest rate found for an interval that is not longer than that of a proof.
-    fn fastest(
-        &self,
-        interval: f64,
-        continuous: f64,
-        longest: &SampledProof,
-        budget: &Budget,
-    ) -> SampledProof {
-        let (mut low, mut high) = (longest.rate, continuous);
-        let mut best = longest.clone();
-        for _ in 0..HALVINGS {
-            if budget.spent().is_some() {
-                break;
-            }
-            let rate = (low * high).sqrt();
-            match self.proof(interval, rate, budget) {
-                Some(proof) => (low, best) = (rate, proof),
-                None => high = rate,
-            }
-        }
-        best
     }
 
     /// What the proof for continuous sensors makes of readings that are held.
@@ -311,6 +340,38 @@ impl SampledSystem {
         let s = (a * b + root) / lost;
         finite_bounds(augmented, &self.of_estimate(proof), Interval::point(s.hi()))
     }
+}
+
+/// What is proved before it is told.
+#[derive(Default)]
+struct Found {
+    longest: Option<SampledProof>,
+    /// for the interval asked about, where slopes count together
+    at: Option<SampledProof>,
+    /// from how long intervals on the error grows at a point of the box, where slopes count together
+    broken: Option<f64>,
+}
+
+/// The fastest rate found by trials that is not slower than that of a proof.
+fn fastest(
+    slow: &SampledProof,
+    continuous: f64,
+    budget: &Budget,
+    mut trial: impl FnMut(f64) -> Option<SampledProof>,
+) -> SampledProof {
+    let (mut low, mut high) = (slow.rate, continuous);
+    let mut best = slow.clone();
+    for _ in 0..HALVINGS {
+        if budget.spent().is_some() {
+            break;
+        }
+        let rate = (low * high).sqrt();
+        match trial(rate) {
+            Some(proof) => (low, best) = (rate, proof),
+            None => high = rate,
+        }
+    }
+    best
 }
 
 /// The error systems over (e, σ, w − y), of observers that read a measurement apart from its innovation, too; the rows of

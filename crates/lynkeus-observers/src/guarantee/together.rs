@@ -10,9 +10,9 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Budget, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::decay::{Field, Together, fastest_together, prove_together};
 use lynkeus_proof::matrix::{IntervalMatrix, square};
-use lynkeus_structure::{AugmentedPlant, Innovation, Region, regularity};
+use lynkeus_structure::{AugmentedPlant, Dimension, Region, regularity};
 
-use super::error_system::{Apart, ErrorSystem};
+use super::error_system::{Apart, ErrorSystem, hats};
 use crate::Observer;
 
 /// Numbers that A may depend on: the work grows with the power of them.
@@ -27,7 +27,7 @@ pub(super) enum Wanted {
 }
 
 /// A at every point of a box.
-struct Joint {
+pub(super) struct Joint {
     /// row by row
     entries: Tape,
     /// the derivatives of the entries that are not 0, with the places of the entries and the numbers; none where an entry
@@ -48,22 +48,16 @@ pub(super) fn together(
     let Some(joint) = Joint::new(augmented, observer, &system.region)? else {
         return Ok(None);
     };
-    let on = |part: &[Interval]| joint.on(part);
-    let slopes = |part: &[Interval]| joint.slopes(part);
-    let field = Field {
-        on: &on,
-        slopes: joint.slopes.is_some().then_some(&slopes),
-        sides: joint.sides.clone(),
-    };
     let scale = &system.scale;
-    Ok(match wanted {
-        Wanted::From(least) => fastest_together(&field, scale, (least, limit), budget),
-        Wanted::At(rate) => prove_together(&field, scale, (rate, limit), budget),
-    })
+    Ok(joint.field(|field| match wanted {
+        Wanted::From(least) => fastest_together(field, scale, (least, limit), budget),
+        Wanted::At(rate) => prove_together(field, scale, (rate, limit), budget),
+    }))
 }
 
 impl Joint {
-    /// None where F jumps, where A depends on too many numbers, and where a range is open.
+    /// That of an observer whose sensors are read continuously. None where F jumps, where A depends on too many numbers,
+    /// and where a range is open.
     fn new(
         augmented: &AugmentedPlant<'_>,
         observer: &Observer,
@@ -72,21 +66,77 @@ impl Joint {
         let graph = augmented.graph();
         let states: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let apart = Apart::new(augmented, observer, region)?;
-        let read: Vec<Innovation> = apart.read.into_iter().map(|(_, own)| own).collect();
-        let errors: Vec<Node> = read.iter().map(|own| own.symbol).collect();
-        let moving = [&states[..], &errors].concat();
+        let moving = [&states[..], &apart.errors()].concat();
         if !regularity(graph, &apart.derivatives, &moving, &apart.region)?.is_proved() {
             return Ok(None);
         }
-        let (entries, sides) = joined(graph, &apart.derivatives, &states, &read, apart.region);
-        let used = graph.symbols_of(&entries);
-        let sides = Region {
-            dimensions: sides
-                .dimensions
-                .into_iter()
-                .filter(|side| used.contains(&side.symbol))
-                .collect(),
+        let n = states.len();
+        let found = Blocks::new(graph, &apart, &states, &states);
+        let mut entries = found.right;
+        for (i, k, slope) in found.gains {
+            let entry = &mut entries[i * n + apart.read[k].1.state];
+            *entry = (graph.expr(*entry) + graph.expr(slope)).node();
+        }
+        Self::of(graph, &entries, n, found.region)
+    }
+
+    /// That over (e, ε) of an observer whose measurements w follow the model between samples, ε = (w − y)/c for a sensor
+    /// that shows c·x_s. With the innovations σ = e_s − ε, and G at x̂ and w,
+    ///
+    /// e' = (J + G E) e + (c H − G) ε, ε' = ∂f_s/∂x e,
+    ///
+    /// where H has F's slopes in what is read apart from the innovations, and J, H and ∂f_s/∂x are means over one segment
+    /// from (x, y) to (x̂, w).
+    pub(super) fn sampled(
+        augmented: &AugmentedPlant<'_>,
+        observer: &Observer,
+        region: &Region,
+        (shown, slopes): (&[usize], &[f64]),
+    ) -> Result<Option<Self>, MissingInput> {
+        let graph = augmented.graph();
+        let states: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
+        let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
+        let apart = Apart::new(augmented, observer, region)?;
+        let plant = graph.substitute(&augmented.derivatives, &hats(augmented, observer));
+        let predicted: Vec<Node> = shown.iter().map(|&state| plant[state]).collect();
+        let moving = [&states[..], &apart.errors(), &measured].concat();
+        let all = [&apart.derivatives[..], &predicted].concat();
+        if !regularity(graph, &all, &moving, &apart.region)?.is_proved() {
+            return Ok(None);
+        }
+        let (n, size) = (states.len(), states.len() + shown.len());
+        let found = Blocks::new(graph, &apart, &states, &[&states[..], &measured].concat());
+        let mut entries = vec![graph.constant(0.0).node(); size * size];
+        let mut add = |i: usize, j: usize, factor: f64, slope: Node| {
+            let entry = &mut entries[i * size + j];
+            *entry = (graph.expr(*entry) + factor * graph.expr(slope)).node();
         };
+        for (place, &slope) in found.right.iter().enumerate() {
+            add(place / n, place % n, 1.0, slope);
+        }
+        for (i, k, slope) in found.gains {
+            let (sensor, own) = &apart.read[k];
+            add(i, own.state, 1.0, slope);
+            add(i, n + sensor, -1.0, slope);
+        }
+        for (i, j, slope) in jacobian::forward(graph, &found.derivatives, &measured).entries {
+            add(i, n + j, slopes[j], slope);
+        }
+        for (j, i, slope) in jacobian::forward(graph, &predicted, &states).entries {
+            add(n + j, i, 1.0, slope);
+        }
+        Self::of(graph, &entries, size, found.region)
+    }
+
+    fn of(
+        graph: &Graph,
+        entries: &[Node],
+        size: usize,
+        region: Region,
+    ) -> Result<Option<Self>, MissingInput> {
+        let used = graph.symbols_of(entries);
+        let mut sides = region;
+        sides.dimensions.retain(|side| used.contains(&side.symbol));
         let is_finite = |side: &Interval| side.is_bounded();
         let ends: Option<Vec<Interval>> = sides
             .dimensions
@@ -97,10 +147,10 @@ impl Joint {
             return Ok(None);
         };
         let symbols = sides.symbols();
-        let is_smooth = regularity(graph, &entries, &symbols, &sides)?.is_proved();
+        let is_smooth = regularity(graph, entries, &symbols, &sides)?.is_proved();
         let slopes = match is_smooth {
             true => {
-                let found = jacobian::forward(graph, &entries, &symbols).entries;
+                let found = jacobian::forward(graph, entries, &symbols).entries;
                 let nodes: Vec<Node> = found.iter().map(|entry| entry.2).collect();
                 let places = found.iter().map(|entry| (entry.0, entry.1)).collect();
                 Some((Tape::new(graph, &symbols, &nodes)?, places))
@@ -108,11 +158,22 @@ impl Joint {
             false => None,
         };
         Ok(Some(Self {
-            entries: Tape::new(graph, &symbols, &entries)?,
+            entries: Tape::new(graph, &symbols, entries)?,
             slopes,
             sides: ends,
-            size: states.len(),
+            size,
         }))
+    }
+
+    /// What a proof needs of it.
+    pub(super) fn field<T>(&self, look: impl FnOnce(&Field<'_>) -> T) -> T {
+        let on = |part: &[Interval]| self.on(part);
+        let slopes = |part: &[Interval]| self.slopes(part);
+        look(&Field {
+            on: &on,
+            slopes: self.slopes.is_some().then_some(&slopes),
+            sides: self.sides.clone(),
+        })
     }
 
     fn on(&self, part: &[Interval]) -> IntervalMatrix {
@@ -131,40 +192,51 @@ impl Joint {
     }
 }
 
-/// J + G, row by row, with sides for x̂ beside those of ξ.
-fn joined(
-    graph: &Graph,
-    derivatives: &[Node],
-    states: &[Node],
-    read: &[Innovation],
-    mut region: Region,
-) -> (Vec<Node>, Region) {
-    let zero = graph.constant(0.0).node();
-    let n = states.len();
-    let errors: Vec<Node> = read.iter().map(|own| own.symbol).collect();
-    let right = errors.iter().map(|&error| (error, zero)).collect();
-    let right = graph.substitute(derivatives, &right);
-    let mut entries = vec![zero; n * n];
-    for (i, j, slope) in jacobian::forward(graph, &right, states).entries {
-        entries[i * n + j] = slope;
-    }
-    let mut elsewhere = HashMap::new();
-    for side in region.dimensions.clone() {
-        if states.contains(&side.symbol) {
-            let own = graph.fresh(&side.name).node();
-            elsewhere.insert(side.symbol, own);
-            region.dimensions.push(lynkeus_structure::Dimension {
-                symbol: own,
-                ..side
-            });
+/// The slopes of F where the innovations vanish, and in these, which are not at the same points.
+struct Blocks {
+    /// F where the innovations vanish
+    derivatives: Vec<Node>,
+    /// J, its slopes in the states, row by row
+    right: Vec<Node>,
+    /// G, those of F in the innovations: equation, innovation, slope
+    gains: Vec<(usize, usize, Node)>,
+    /// with sides for where G is beside those of where J is
+    region: Region,
+}
+
+impl Blocks {
+    /// With symbols of its own in G for each of `doubled`.
+    fn new(graph: &Graph, apart: &Apart, states: &[Node], doubled: &[Node]) -> Self {
+        let zero = graph.constant(0.0).node();
+        let n = states.len();
+        let errors = apart.errors();
+        let vanishing = errors.iter().map(|&error| (error, zero)).collect();
+        let derivatives = graph.substitute(&apart.derivatives, &vanishing);
+        let mut right = vec![zero; n * n];
+        for (i, j, slope) in jacobian::forward(graph, &derivatives, states).entries {
+            right[i * n + j] = slope;
+        }
+        let mut region = apart.region.clone();
+        let mut elsewhere = HashMap::new();
+        for side in &apart.region.dimensions {
+            if doubled.contains(&side.symbol) {
+                let own = graph.fresh(&side.name).node();
+                elsewhere.insert(side.symbol, own);
+                region.dimensions.push(Dimension {
+                    symbol: own,
+                    ..side.clone()
+                });
+            }
+        }
+        let gains = jacobian::forward(graph, &apart.derivatives, &errors).entries;
+        let slopes: Vec<Node> = gains.iter().map(|gain| gain.2).collect();
+        let slopes = graph.substitute(&slopes, &elsewhere);
+        let places = gains.into_iter().zip(slopes);
+        Self {
+            derivatives,
+            right,
+            gains: places.map(|((i, k, _), slope)| (i, k, slope)).collect(),
+            region,
         }
     }
-    let gains = jacobian::forward(graph, derivatives, &errors).entries;
-    let slopes: Vec<Node> = gains.iter().map(|gain| gain.2).collect();
-    let slopes = graph.substitute(&slopes, &elsewhere);
-    for ((i, k, _), slope) in gains.into_iter().zip(slopes) {
-        let entry = &mut entries[i * n + read[k].state];
-        *entry = (graph.expr(*entry) + graph.expr(slope)).node();
-    }
-    (entries, region)
 }

@@ -22,17 +22,26 @@ pub fn holds(models: &[ErrorModel], proof: &Proof) -> bool {
 /// one per sensor, are the innovations that the observer reads, in units of the states `shown`: a
 /// sample sets them to these states' errors. See [`SampledProof`].
 pub fn holds_between_samples(models: &[ErrorModel], shown: &[usize], proof: &SampledProof) -> bool {
+    let size = proof.P.first().map_or(0, DMatrix::nrows);
+    let is_shown = |&state: &usize| state + shown.len() < size;
+    falls_at_samples(proof, shown.len())
+        && proof.multipliers.len() + 1 == proof.P.len()
+        && shown.iter().all(is_shown)
+        && pieces_fall(models, shown, proof)
+}
+
+/// Whether a sample, which sets the errors ε of so many predictions to 0, raises no zᵀP(τ)z, whenever it comes: P(0) > 0
+/// has no entries between e and ε, and every other P is larger than what P(0) has of e.
+pub(super) fn falls_at_samples(proof: &SampledProof, sensors: usize) -> bool {
     let [first, later @ ..] = &proof.P[..] else {
         return false;
     };
-    let Some(n) = first.nrows().checked_sub(shown.len()) else {
+    let Some(n) = first.nrows().checked_sub(sensors) else {
         return false;
     };
     let size = first.nrows();
     let is_fit = !later.is_empty()
-        && proof.multipliers.len() == later.len()
         && proof.P.iter().all(|P| is_form(P) && P.nrows() == size)
-        && shown.iter().all(|&state| state < n)
         && proof.interval > 0.0
         && proof.interval.is_finite();
     if !is_fit {
@@ -53,7 +62,6 @@ pub fn holds_between_samples(models: &[ErrorModel], shown: &[usize], proof: &Sam
     is_split
         && is_positive_definite(&points(first))
         && later.iter().all(|P| is_positive_definite(&kept(P)))
-        && pieces_fall(models, shown, proof)
 }
 
 /// V' ≤ −2·rate·V at both ends of every piece: P' is the same on all of it, so that it holds between.

@@ -24,6 +24,7 @@ pub use analysis::{fastest, prove};
 pub use check::{holds, holds_between_samples};
 pub use growth::is_unstable;
 pub use sampled::{longest, prove_between_samples};
+pub use samples::{Samples, holds_between_samples_together};
 pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};
 pub use together::{Covered, Field, Together, fastest_together, holds_together, prove_together};
 
@@ -32,6 +33,7 @@ mod check;
 mod frame;
 mod growth;
 mod sampled;
+mod samples;
 mod synthesis;
 mod together;
 

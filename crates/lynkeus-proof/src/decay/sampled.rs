@@ -59,10 +59,27 @@ pub fn longest(
     budget: &Budget,
 ) -> Option<SampledProof> {
     let search = Search::new(models, shown, scale, budget)?;
-    let unit = search.frame.unit;
     let proved = |interval: f64| search.proof(interval, rate);
-    let (mut low, mut high) = (unit, unit);
-    let mut best = proved(unit);
+    longest_by(search.frame.unit, None, budget, proved)
+}
+
+/// The time that the fastest motion of the models takes; none of models that are not in (e, σ).
+pub(super) fn unit(models: &[ErrorModel], shown: &[usize], scale: &[f64]) -> Option<f64> {
+    let budget = Budget::default();
+    let search = Search::new(models, shown, scale, &budget)?;
+    Some(search.frame.unit)
+}
+
+/// The longest interval that is proved: from one that is, or else about a unit of time.
+pub(super) fn longest_by(
+    unit: f64,
+    first: Option<SampledProof>,
+    budget: &Budget,
+    mut proved: impl FnMut(f64) -> Option<SampledProof>,
+) -> Option<SampledProof> {
+    let start = first.as_ref().map_or(unit, |proof| proof.interval);
+    let (mut low, mut high) = (start, start);
+    let mut best = first.or_else(|| proved(start));
     if best.is_some() {
         while let Some(found) = proved(high * 2.0) {
             (low, high, best) = (high * 2.0, high * 2.0, Some(found));

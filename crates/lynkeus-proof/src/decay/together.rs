@@ -16,7 +16,7 @@ use crate::definite::is_positive_definite;
 use crate::matrix::{IntervalMatrix, points, product, square};
 
 /// Parts of the box that are examined for one P, at most, and for all of a search.
-const PARTS: usize = 12_000;
+pub(super) const PARTS: usize = 12_000;
 const ALL_PARTS: usize = 32_000;
 /// Numbers of which every combination of ends is examined on a part.
 const ENDS: usize = 6;
@@ -68,17 +68,17 @@ pub struct Together {
 /// interval arithmetic decides.
 pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &Budget) -> Covered {
     let mut left = PARTS;
-    covered(field, (P, rate), &mut left, budget)
+    covered(field, Form::new(P, rate), &mut left, budget)
 }
 
-/// The same, with so many parts left to examine.
-fn covered(
+/// The same of a form that may change, with so many parts left to examine.
+pub(super) fn covered(
     field: &Field<'_>,
-    (P, rate): (&DMatrix<f64>, f64),
+    form: Option<Form>,
     left: &mut usize,
     budget: &Budget,
 ) -> Covered {
-    let Some(form) = Form::new(P, rate) else {
+    let Some(form) = form else {
         return Covered::Not(middle(&field.sides));
     };
     let mut open = vec![field.sides.clone()];
@@ -119,12 +119,12 @@ fn points_of(point: &[f64]) -> Vec<Interval> {
     point.iter().map(|&x| Interval::point(x)).collect()
 }
 
-/// He(P A) + 2·rate·P in axes T in which P is about the unit: for an invertible T it is negative definite there
+/// P' + He(P A) + 2·rate·P in axes T in which P is about the unit: for an invertible T it is negative definite there
 /// where it is so in those of P, and for another one nowhere.
-struct Form {
+pub(super) struct Form {
     /// TᵀP and T
     sides: [IntervalMatrix; 2],
-    /// 2·rate·TᵀPT
+    /// Tᵀ(P' + 2·rate·P)T
     decay: IntervalMatrix,
     /// how much an entry of A counts for: the lengths of the columns of TᵀP and of the rows of T
     weights: [Vec<f64>; 2],
@@ -132,15 +132,22 @@ struct Form {
 
 impl Form {
     fn new(P: &DMatrix<f64>, rate: f64) -> Option<Self> {
+        Self::changing(P, &square(P.nrows(), |_, _| Interval::ZERO), rate)
+    }
+
+    /// Of a P that changes at so much per unit of time.
+    pub fn changing(P: &DMatrix<f64>, change: &IntervalMatrix, rate: f64) -> Option<Self> {
         let sound = is_form(P) && rate.is_finite() && is_positive_definite(&points(P));
         let T = sound.then(|| P.clone().cholesky()?.l().transpose().try_inverse())??;
         let left = product(&points(&T.transpose()), &points(P));
         let right = points(&T);
         let twice = Interval::point(2.0) * Interval::point(rate);
         let whole = product(&left, &right);
+        let transposed = points(&T.transpose());
+        let moved = product(&product(&transposed, change), &right);
         let n = P.nrows();
         Some(Self {
-            decay: square(n, |i, j| twice * whole[i][j]),
+            decay: square(n, |i, j| twice * whole[i][j] + moved[i][j]),
             weights: [
                 (T.transpose() * P)
                     .column_iter()
@@ -274,6 +281,29 @@ impl Form {
     }
 }
 
+/// The middle of a box and corners of it: of many some, spread.
+pub(super) fn first_points(sides: &[Interval], count: usize) -> Vec<Vec<f64>> {
+    let mut found = vec![middle(sides)];
+    let widths = sides.iter().map(|side| side.lo() < side.hi());
+    let wide: Vec<usize> = widths.enumerate().filter(|w| w.1).map(|w| w.0).collect();
+    let all = 1_usize.checked_shl(wide.len() as u32).unwrap_or(usize::MAX);
+    let corners = count.saturating_sub(1).max(1);
+    let stride = (all / corners).max(1) | 1;
+    for k in 0..all.min(corners) {
+        let corner = k.wrapping_mul(stride);
+        let mut point = found[0].clone();
+        for (bit, &side) in wide.iter().enumerate() {
+            let ends = sides[side];
+            point[side] = match corner >> bit & 1 {
+                0 => ends.lo(),
+                _ => ends.hi(),
+            };
+        }
+        found.push(point);
+    }
+    found
+}
+
 /// Proofs for a field, from the points that earlier ones failed at.
 struct Search<'a> {
     field: &'a Field<'a>,
@@ -294,23 +324,7 @@ impl<'a> Search<'a> {
             models: vec![],
             left: ALL_PARTS,
         };
-        let middle = middle(&field.sides);
-        search.add(&middle);
-        let widths = field.sides.iter().map(|side| side.lo() < side.hi());
-        let wide: Vec<usize> = widths.enumerate().filter(|w| w.1).map(|w| w.0).collect();
-        let all = 1_usize.checked_shl(wide.len() as u32).unwrap_or(usize::MAX);
-        // of many corners some, spread
-        let stride = (all / CORNERS).max(1) | 1;
-        for k in 0..all.min(CORNERS) {
-            let corner = k.wrapping_mul(stride);
-            let mut point = middle.clone();
-            for (bit, &side) in wide.iter().enumerate() {
-                let ends = field.sides[side];
-                point[side] = match corner >> bit & 1 {
-                    0 => ends.lo(),
-                    _ => ends.hi(),
-                };
-            }
+        for point in first_points(&field.sides, CORNERS + 1) {
             search.add(&point);
         }
         search
@@ -341,7 +355,8 @@ impl<'a> Search<'a> {
                 return None;
             }
             let found = prove(&self.models, self.scale, faster, self.budget)?;
-            match covered(self.field, (&found.P, rate), &mut self.left, self.budget) {
+            let form = Form::new(&found.P, rate);
+            match covered(self.field, form, &mut self.left, self.budget) {
                 Covered::By(parts) => {
                     let multipliers = vec![];
                     let proof = Proof {

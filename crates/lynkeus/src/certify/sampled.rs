@@ -113,8 +113,12 @@ pub(super) fn tell(
         number(found.longest.rate)
     ));
     if found.broken.is_finite() {
+        let slopes = match found.together {
+            true => "as they are at a point of the box",
+            false => "at an end of their ranges",
+        };
         document.item(format!(
-            "from {} apart on equal intervals would let it grow, with slopes that stay at an end of their ranges",
+            "from {} apart on equal intervals would let it grow, with slopes that stay {slopes}",
             number(found.broken)
         ));
     }
