@@ -44,8 +44,8 @@ pub struct Findings {
     /// none where the family does not take the plant
     pub design: Option<StudyDesign>,
     pub claims: Vec<Claim>,
-    /// for samples, with the longest interval between them
-    pub sampled: Option<(Claim, f64)>,
+    /// for samples, with the longest interval between them, and whether the slopes count together
+    pub sampled: Option<(Claim, f64, bool)>,
     /// where the plant is from the starts that the study asks about
     pub tube: Option<Tube>,
     pub refutations: Vec<Refutation>,
@@ -84,7 +84,8 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
     found.contradicts = report.certificate.verdict() == Standing::Refuted
         && theorem.is_some_and(|theorem| theorem.verdict() == Standing::Proved);
     found.sampled = report.sampled.as_ref().and_then(|sampled| {
-        let longest = &sampled.as_ref().ok()?.longest;
+        let sampled = sampled.as_ref().ok()?;
+        let longest = &sampled.longest;
         let claim = Claim {
             basis: format!("samples up to {} apart", longest.interval),
             rate: longest.rate,
@@ -94,7 +95,7 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
             lyapunov: Some(longest.lyapunov.clone()),
             sides: report.certificate.region.clone(),
         };
-        Some((claim, longest.interval))
+        Some((claim, longest.interval, sampled.together))
     });
     found.tube = report.tube;
     found.certified(report.certificate, true);

@@ -208,7 +208,7 @@ impl Look<'_, '_> {
 
     /// Plant and sampled observer, with samples as far apart as is claimed or less.
     fn against_samples(&mut self, observer: &Observer, numbers: &mut Numbers) {
-        let Some((claim, longest)) = &self.found.sampled else {
+        let Some((claim, longest, together)) = &self.found.sampled else {
             return;
         };
         let claims = std::slice::from_ref(claim);
@@ -235,6 +235,7 @@ impl Look<'_, '_> {
             .collect();
         attack.samples = Some(*longest);
         self.counts.sampled += 1;
+        self.counts.sampled_together += usize::from(*together);
         let (plan, worst) = attack.search(numbers, self.effort.runs);
         if worst.ratio > 1.0 + 1e-4 {
             let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);

@@ -23,6 +23,8 @@ pub struct Counts {
     pub sampled: usize,
     /// proofs that take the slopes as they are together
     pub together: usize,
+    /// the same of proofs for samples
+    pub sampled_together: usize,
     /// tubes that were attacked, and those of them that stay in the box
     pub tubes: usize,
     pub stay: usize,
@@ -48,6 +50,7 @@ impl Counts {
         self.followed += other.followed;
         self.sampled += other.sampled;
         self.together += other.together;
+        self.sampled_together += other.sampled_together;
         self.tubes += other.tubes;
         self.stay += other.stay;
         self.violated += other.violated;
@@ -74,8 +77,8 @@ impl Tally {
 
     /// A table in Markdown.
     pub fn table(&self) -> String {
-        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | tubes | that stay | violated | witnesses checked | wrong |\n\
-                        |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
+        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | samples together | tubes | that stay | violated | witnesses checked | wrong |\n\
+                        |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
         let rows = self.0.iter().map(|(kind, counts)| (kind.word(), counts));
         let total = self.total();
@@ -90,6 +93,7 @@ impl Tally {
                 c.followed,
                 c.sampled,
                 c.together,
+                c.sampled_together,
                 c.tubes,
                 c.stay,
                 c.violated,

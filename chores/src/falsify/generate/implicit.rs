@@ -37,7 +37,8 @@ impl Draft<'_> {
             (Manner::Hostile, 0) => format!("(1 + {x})"),
             (Manner::Hostile, 1) => format!("(2*{x})"),
             (Manner::Hostile, 2) => format!("sign({x} - 0.1)"),
-            (Manner::Hostile, 3) => "1.0".to_owned(),
+            // two of 1.0 leave no plant: they are refused before anything is said of it
+            (Manner::Hostile, 3) => "0.999".to_owned(),
             (Manner::Kinked, 0) => format!("{w}*abs(sin({x}))"),
             (_, 1) => format!("{w}*cos({x})"),
             (_, 2) => format!("{w}*sin(time)"),

@@ -9,19 +9,28 @@ use lynkeus_expr::{Budget, Interval};
 
 use super::check::falls_at_samples;
 use super::sampled::{longest_by, unit};
-use super::together::{Covered, Field, Form, PARTS, covered, first_points};
+use super::together::{Covered, FIRST_PARTS, Field, Form, PARTS, covered, first_points};
 use super::{ErrorModel, SampledProof, between_errors, prove_between_samples};
 use crate::matrix::{points, product, square};
 
-/// Parts that may be examined in all of a search, and proofs that may be proposed.
+/// Parts that may be examined in all of a search.
 const ALL_PARTS: usize = 40_000;
-const PROPOSED: usize = 60;
+/// Proposals after which it is given up that an interval can be longer than one that is known.
+const FIRST: usize = 8;
 /// Points of the box that a proposal is for at first.
 const POINTS: usize = 17;
 /// Points that are added for one interval, at most.
 const ADDED: usize = 12;
 /// Proposals are for rates faster by these shares of the continuous one, so that they have a margin.
 const MARGINS: [f64; 3] = [0.3, 0.1, 0.03];
+
+/// Proofs that may be proposed in a search: the solver takes longer for more of (e, ε).
+fn proposals(size: usize) -> usize {
+    match size {
+        0..=5 => 100,
+        _ => 50,
+    }
+}
 
 /// Whether a proof holds at samples and between them, at every ξ of the box, for errors (e, ε) of which the last entries
 /// are those of so many predictions. Nothing but P, the interval, the rate and interval arithmetic decides.
@@ -94,7 +103,7 @@ impl<'a> Samples<'a> {
             budget,
             models: vec![],
             left: ALL_PARTS,
-            proposals: PROPOSED,
+            proposals: proposals(scale.len() + shown.len()),
         };
         for point in first_points(&field.sides, POINTS) {
             samples.add(&point);
@@ -109,7 +118,8 @@ impl<'a> Samples<'a> {
 
     /// Lets a further search take as long as the first.
     pub fn replenish(&mut self) {
-        (self.left, self.proposals) = (ALL_PARTS, PROPOSED);
+        self.left = ALL_PARTS;
+        self.proposals = proposals(self.scale.len() + self.shown.len());
     }
 
     /// Whether the point is new and 𝒜 has a value there.
@@ -135,7 +145,9 @@ impl<'a> Samples<'a> {
         match least {
             None => longest_by(unit, None, budget, |interval| self.prove(interval, rate)),
             Some(least) => {
+                (self.left, self.proposals) = (FIRST_PARTS, FIRST);
                 let first = self.prove(least, rate)?;
+                self.replenish();
                 longest_by(unit, Some(first), budget, |interval| {
                     self.prove(interval, rate)
                 })
@@ -153,6 +165,9 @@ impl<'a> Samples<'a> {
 
     fn prove_by(&mut self, interval: f64, rate: f64, faster: f64) -> Option<SampledProof> {
         for _ in 0..ADDED {
+            if self.left == 0 {
+                return None;
+            }
             self.proposals = self.proposals.checked_sub(1)?;
             let claim = (interval, faster);
             let found =

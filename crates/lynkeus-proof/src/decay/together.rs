@@ -18,6 +18,8 @@ use crate::matrix::{IntervalMatrix, points, product, square};
 /// Parts of the box that are examined for one P, at most, and for all of a search.
 pub(super) const PARTS: usize = 12_000;
 const ALL_PARTS: usize = 32_000;
+/// The same until it is given up that a decay can be faster than one that is known.
+pub(super) const FIRST_PARTS: usize = 6_000;
 /// Numbers of which every combination of ends is examined on a part.
 const ENDS: usize = 6;
 /// Corners of the box that P is sought for at first, at most.
@@ -396,7 +398,11 @@ pub fn fastest_together(
     budget: &Budget,
 ) -> Option<Together> {
     let mut search = Search::new(field, scale, budget);
+    if least > 0.0 {
+        search.left = FIRST_PARTS;
+    }
     let mut best = search.prove(least.max(NEGLIGIBLE * limit), limit)?;
+    search.left = ALL_PARTS;
     let mut high = limit;
     while best.proof.rate < high * (1.0 - ACCURACY) && budget.spent().is_none() {
         let rate = match best.proof.rate < 0.1 * high {

@@ -18,8 +18,8 @@ pub(super) struct SampledEntry {
     longest: Option<AtSamplesEntry>,
     /// for the samples of the study's simulation; null where it has none or they are not proved
     at: Option<AtSamplesEntry>,
-    /// from how long equal intervals on slopes at an end of their ranges, if they stayed there, would let the error grow;
-    /// null where that was not seen
+    /// from how long equal intervals on slopes that stay at an end of their ranges, or as they are at a point of the box,
+    /// would let the error grow; null where that was not seen
     broken: Option<f64>,
     /// for readings that are held instead, as far apart as the study's: with the proof for continuous sensors
     held: Option<AtSamplesEntry>,

@@ -357,3 +357,30 @@ end M;",
     );
     assert!(!estimate.out.contains("scatter"), "{}", estimate.out);
 }
+
+/// a' = (u − 10) a − …: on all that is declared of u the error decays at θ − 1.9 = 0.1, with the study's own at θ + 9.
+#[test]
+fn the_study_s_own_inputs_are_the_answer_where_they_make_much_of_a_difference() {
+    for (theta, own) in [(2.0, true), (4.0, false)] {
+        let folder = Folder::empty();
+        let model = "model M
+  input Real u(start = 1, min = -1, max = 11.9);
+  Real a(start = 0.2, min = -1, max = 1.5);
+  output Real y = a;
+equation
+  der(a) = (u - 10)*a;
+end M;";
+        folder.write("m.mo", model);
+        let study = format!(
+            "plant = \"m.mo\"\n[observer]\nfamily = \"triangular\"\ntheta = {theta}\n[simulate]\nuntil = 4\noutput_step = 0.1\ninputs = {{ u = 1 }}\n"
+        );
+        folder.write("study.toml", &study);
+        let found = certified(&folder);
+        let rate = found["certificate"]["rate"].as_f64().unwrap();
+        let expected = if own { theta + 9.0 } else { theta - 1.9 };
+        assert!((rate / expected - 1.0).abs() < 0.03, "{rate}, {expected}");
+        let text = folder.run(&["certify", "study.toml"]).out;
+        let said = "for the inputs of [simulate], u = 1; on their declared ranges: proved, at 0.";
+        assert_eq!(text.contains(said), own, "{text}");
+    }
+}
