@@ -36,7 +36,6 @@ pub(crate) struct Ukf {
     expected: Vec<f64>,
     rows: Vec<f64>,
     extra: Vec<f64>,
-    sums: Vec<f64>,
     factor: Factor,
     manifold: Manifold,
     /// states that events alone change, without a deviation
@@ -66,7 +65,6 @@ impl Ukf {
             expected: vec![],
             rows: vec![],
             extra: vec![],
-            sums: vec![],
             factor: Factor::default(),
         })
     }
@@ -194,10 +192,9 @@ impl Ukf {
                 rows.extend(d.iter().map(|x| weight * x));
             }
             rows.extend_from_slice(&self.extra);
-            self.sums.resize(n, 0.0);
             match self.jumps {
-                true => root_of_moving(rows, &mut self.sums, root),
-                false => root.of_rows(rows, &mut self.sums),
+                true => root_of_moving(rows, root),
+                false => root.of_rows(rows),
             }
             return;
         }
@@ -420,12 +417,12 @@ impl Ukf {
 
 /// The lower root of AᵀA for rows A, without a column for states that do not differ: what stands there else depends on
 /// rounding, and so would the points.
-fn root_of_moving(rows: &mut [f64], sums: &mut [f64], root: &mut Root) {
+fn root_of_moving(rows: &mut [f64], root: &mut Root) {
     let n = root.n;
     let moves = |i: &usize| rows.iter().skip(*i).step_by(n).any(|x| *x != 0.0);
     let moving: Vec<usize> = (0..n).filter(moves).collect();
     if moving.len() == n {
-        return root.of_rows(rows, sums);
+        return root.of_rows(rows);
     }
     for row in rows.chunks_exact_mut(n) {
         for (place, &i) in moving.iter().enumerate() {
@@ -433,7 +430,7 @@ fn root_of_moving(rows: &mut [f64], sums: &mut [f64], root: &mut Root) {
         }
         row[moving.len()..].fill(0.0);
     }
-    root.of_rows(rows, sums);
+    root.of_rows(rows);
     let packed = root.entries.clone();
     root.entries.fill(0.0);
     for (a, i) in moving.iter().enumerate() {

@@ -109,14 +109,14 @@ impl Propagation {
 
     /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. A flow that fails leaves the belief as it was.
     pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<()> {
-        if let Scheme::Joint(joint) = &mut self.scheme
-            && joint.leap(&mut self.driven, belief, from, to)
-        {
-            self.is_behind = true;
-            return Ok(());
+        self.is_behind = match &mut self.scheme {
+            Scheme::Joint(joint) => joint.leap(&mut self.driven, belief, from, to),
+            Scheme::Piecewise(_) => false,
+        };
+        if !self.is_behind {
+            self.advance(belief, from, to)?;
+            belief.x.clone_from(&self.end);
         }
-        self.advance(belief, from, to)?;
-        belief.x.clone_from(&self.end);
         let is_carried = match &mut self.scheme {
             Scheme::Joint(joint) => joint.take(&mut belief.root),
             Scheme::Piecewise(_) => false,
@@ -306,7 +306,8 @@ fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut 
     rows.resize(begin + n * n, 0.0);
     for (i, (first, row)) in transition.rows().enumerate() {
         sums.fill(0.0);
-        for (j, phi) in (first..).zip(row) {
+        let entries = (first..).zip(row);
+        for (j, phi) in entries.filter(|(_, phi)| **phi != 0.0) {
             for (sum, s) in sums.iter_mut().zip(&root.row(j)[..=j]) {
                 *sum += phi * s;
             }
@@ -314,7 +315,7 @@ fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut 
         let column = rows[begin + i..].iter_mut().step_by(n);
         column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
     }
-    root.of_rows(rows, sums);
+    root.of_rows(rows);
 }
 
 #[cfg(test)]
