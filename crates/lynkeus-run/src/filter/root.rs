@@ -70,7 +70,7 @@ impl Root {
         for (i, row) in self.entries.chunks_exact(n.max(1)).enumerate() {
             (0..n).for_each(|k| rows[k * n + i] = row[k]);
         }
-        self.of_rows(&mut rows);
+        self.of_rows(&mut rows, &mut vec![]);
     }
 
     /// φ with φS = b; components along which P has no variance but this share of what the state has are 0.
@@ -131,9 +131,9 @@ impl Root {
 
     /// The lower triangular root of AᵀA, for the rows A (each of n entries): what is left of A
     /// after Householder's reflections. The diagonal is not negative.
-    pub fn of_rows(&mut self, rows: &mut [f64]) {
+    pub fn of_rows(&mut self, rows: &mut [f64], room: &mut Reflector) {
         let n = self.n;
-        triangularise(rows, n);
+        triangularise(rows, n, room);
         self.entries.fill(0.0);
         for i in 0..n.min(rows.len() / n.max(1)) {
             let sign = if rows[i * n + i] < 0.0 { -1.0 } else { 1.0 };
@@ -159,11 +159,12 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
+/// The entries of a reflector that are not 0, and where the rows that they change begin.
+pub(crate) type Reflector = Vec<(usize, f64)>;
+
 /// Reflections that make the first n rows of A upper triangular.
-fn triangularise(rows: &mut [f64], n: usize) {
+fn triangularise(rows: &mut [f64], n: usize, reflector: &mut Reflector) {
     let count = rows.len() / n.max(1);
-    // where the rows that it changes begin, and its entries
-    let mut reflector = Vec::with_capacity(count);
     for k in 0..n.min(count) {
         let column = (k..count).map(|i| (i * n, rows[i * n + k]));
         reflector.clear();
@@ -185,8 +186,8 @@ fn triangularise(rows: &mut [f64], n: usize) {
             Some((row, entry)) if *row == k * n => *entry = first,
             _ => reflector.insert(0, (k * n, first)),
         }
-        reflect(rows, k + 1..n, &reflector, -head * first);
-        for (row, _) in &reflector {
+        reflect(rows, k + 1..n, reflector, -head * first);
+        for (row, _) in &*reflector {
             rows[row + k] = 0.0;
         }
         rows[k * n + k] = head * unit;
@@ -343,14 +344,14 @@ mod tests {
             })
             .collect();
         let mut root = Root::diagonal(&[0.0; 3]);
-        root.of_rows(&mut rows.clone());
+        root.of_rows(&mut rows.clone(), &mut vec![]);
         close(&covariance(&root), &expected, 1e-13);
         assert!(
             (0..3).all(|i| root.row(i)[i] >= 0.0 && root.row(i)[i + 1..].iter().all(|s| *s == 0.0))
         );
         // fewer rows than columns: rank one
         let mut flat = Root::diagonal(&[0.0; 3]);
-        flat.of_rows(&mut [1.0, 2.0, 3.0]);
+        flat.of_rows(&mut [1.0, 2.0, 3.0], &mut vec![]);
         close(
             &covariance(&flat),
             &[1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 3.0, 6.0, 9.0],
@@ -364,7 +365,7 @@ mod tests {
         for exponent in -1080..=1000 {
             let tiny = 1.3 * 2.0_f64.powi(exponent);
             let mut root = Root::diagonal(&[0.0; 2]);
-            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7]);
+            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7], &mut vec![]);
             let found = root.deviation(1).powi(2);
             assert!((found - 2.29).abs() < 1e-14, "{found} beside {tiny:e}");
         }

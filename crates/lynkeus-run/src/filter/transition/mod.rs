@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::belief::Belief;
 use super::profile::Profile;
-use super::root::{Factor, Root, dot};
+use super::root::{Factor, Reflector, Root, dot};
 use crate::Evaluation;
 use crate::events::Memory;
 use crate::manifold::Manifold;
@@ -43,7 +43,7 @@ pub(crate) struct Propagation {
     /// W in that order
     ordered: Vec<f64>,
     rows: Vec<f64>,
-    sums: Vec<f64>,
+    room: Room,
     /// so many last states are drawn anew in every row
     drawn: usize,
 }
@@ -80,7 +80,7 @@ impl Propagation {
             order: order.flatten(),
             ordered: vec![],
             rows: vec![],
-            sums: vec![0.0; n],
+            room: Room::default(),
             drawn: 0,
         })
     }
@@ -133,7 +133,7 @@ impl Propagation {
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
         self.push_root(&mut rows);
-        carry(&self.transition.matrix, root, &mut rows, &mut self.sums);
+        carry(&self.transition.matrix, root, &mut rows, &mut self.room);
         self.rows = rows;
     }
 
@@ -191,7 +191,7 @@ impl Propagation {
         let Some(noise) = &self.transition.noise else {
             return;
         };
-        let n = self.sums.len();
+        let n = self.transition.matrix.size();
         let mut entries = noise.entries();
         if let Some(order) = &self.order {
             let pairs = order.iter().flat_map(|i| order.iter().map(move |j| (i, j)));
@@ -289,8 +289,7 @@ impl Stage {
         let moved = self.end.iter().zip(self.transition.rows());
         let x = moved.map(|(x, (first, row))| x + dot(row, &off[first..]));
         let (mut root, mut rows) = (after.root.clone(), self.noise.clone());
-        let mut sums = vec![0.0; off.len()];
-        carry(&self.transition, &mut root, &mut rows, &mut sums);
+        carry(&self.transition, &mut root, &mut rows, &mut Room::default());
         Belief {
             x: x.collect(),
             root,
@@ -298,9 +297,18 @@ impl Stage {
     }
 }
 
+/// Room to carry a root in.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    sums: Vec<f64>,
+    reflector: Reflector,
+}
+
 /// ΦPΦᵀ + W, where `rows` are those of W: they come first, since their zeros are spared in the
-/// reflections. `sums` is room for a number of each state.
-fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut [f64]) {
+/// reflections.
+fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, room: &mut Room) {
+    let Room { sums, reflector } = room;
+    sums.resize(root.n, 0.0);
     let n = root.n;
     let begin = rows.len();
     rows.resize(begin + n * n, 0.0);
@@ -315,7 +323,7 @@ fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut 
         let column = rows[begin + i..].iter_mut().step_by(n);
         column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
     }
-    root.of_rows(rows);
+    root.of_rows(rows, reflector);
 }
 
 #[cfg(test)]
