@@ -262,10 +262,13 @@ impl<'a> Run<'a> {
 
     fn judge(&mut self, t: f64, x: &[f64], ranges: &[Interval], place: &str) {
         for (i, (x, range)) in x.iter().zip(ranges).enumerate() {
-            let ratio = self.off(i, *x, *range).abs();
-            // not written with ≤: what is no number is outside
-            if !(ratio <= self.worst.ratio) {
-                self.worst.ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+            let ratio = match self.off(i, *x, *range).abs() {
+                // what is no number is outside
+                none if none.is_nan() => f64::INFINITY,
+                ratio => ratio,
+            };
+            if ratio > self.worst.ratio {
+                self.worst.ratio = ratio;
                 let name = &self.case.states[i].name;
                 self.worst.what = format!("{name} = {x:e} at {t}, the tube has {range} {place}");
             }

@@ -15,8 +15,6 @@ use crate::matrix::{points, product, square};
 
 /// Parts that may be examined in all of a search.
 const ALL_PARTS: usize = 40_000;
-/// Proposals after which it is given up that an interval can be longer than one that is known.
-const FIRST: usize = 8;
 /// Points of the box that a proposal is for at first.
 const POINTS: usize = 17;
 /// Points that are added for one interval, at most.
@@ -29,6 +27,14 @@ fn proposals(size: usize) -> usize {
     match size {
         0..=5 => 100,
         _ => 50,
+    }
+}
+
+/// Parts and proposals after which it is given up that an interval can be longer than one that is known.
+fn first(size: usize) -> (usize, usize) {
+    match size {
+        0..=6 => (ALL_PARTS, 15),
+        _ => (FIRST_PARTS, 8),
     }
 }
 
@@ -145,7 +151,7 @@ impl<'a> Samples<'a> {
         match least {
             None => longest_by(unit, None, budget, |interval| self.prove(interval, rate)),
             Some(least) => {
-                (self.left, self.proposals) = (FIRST_PARTS, FIRST);
+                (self.left, self.proposals) = first(self.scale.len() + self.shown.len());
                 let first = self.prove(least, rate)?;
                 self.replenish();
                 longest_by(unit, Some(first), budget, |interval| {
