@@ -372,13 +372,20 @@ impl CertifyReport {
     }
 
     /// What the root of the error's mean square ends within, by the sharper of the two ways; none without
-    /// process noise.
+    /// Gaussian noise.
     pub fn mean_square(&self) -> Option<&Bounds> {
-        let both = [Some(&self.certificate), self.theorem.as_ref()]
-            .into_iter()
-            .flatten();
-        let found = both.filter_map(|certificate| certificate.mean_square.as_ref());
-        found.min_by(|a, b| a.norm.total_cmp(&b.norm))
+        self.sharper(|certificate| certificate.mean_square.as_ref())
+    }
+
+    /// What the error is within in the end, at any one time with a probability of 0.99; none without Gaussian noise.
+    pub fn probable(&self) -> Option<&Bounds> {
+        self.sharper(|certificate| certificate.probable.as_ref())
+    }
+
+    fn sharper(&self, of: impl Fn(&Certificate) -> Option<&Bounds>) -> Option<&Bounds> {
+        let both = std::iter::once(&self.certificate).chain(&self.theorem);
+        both.filter_map(of)
+            .min_by(|a, b| a.norm.total_cmp(&b.norm))
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

@@ -76,10 +76,14 @@ struct ProofSummary {
     ultimate_bound: Option<f64>,
     /// the same for each quantity, in its unit
     ultimate_bounds: Named<Option<f64>>,
-    /// the norm below which the error ends in the root of the mean square, under noise
+    /// the norm below which the error ends in the root of the mean square, under Gaussian noise
     mean_square_bound: Option<f64>,
     /// the same for each quantity, in its unit
     mean_square_bounds: Named<Option<f64>>,
+    /// the norm below which the error is in the end, at any one time with a probability of 0.99, under Gaussian noise
+    probable_bound: Option<f64>,
+    /// the same for each quantity, in its unit
+    probable_bounds: Named<Option<f64>>,
     /// the ranges on which it holds
     #[serde(rename = "box")]
     region: Named<Range>,
@@ -143,11 +147,12 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
 /// The better of the two ways, with the verdict of both.
 fn summary(report: &CertifyReport) -> ProofSummary {
     let mut best = report.best().clone();
-    best.mean_square = None;
+    (best.mean_square, best.probable) = (None, None);
     if report.is_contradiction() {
         (best.rate, best.ultimate_bound, best.ultimate) = (None, None, vec![]);
     } else {
         best.mean_square = report.mean_square().cloned();
+        best.probable = report.probable().cloned();
     }
     ProofSummary {
         verdict: report.verdict().into(),
@@ -158,6 +163,7 @@ fn summary(report: &CertifyReport) -> ProofSummary {
 impl From<&Certificate> for ProofSummary {
     fn from(certificate: &Certificate) -> Self {
         let mean_square = certificate.mean_square.as_ref();
+        let probable = certificate.probable.as_ref();
         let constants = certificate.constants.iter().map(|c| ConstantEntry {
             name: c.name.clone(),
             value: finite(c.value),
@@ -171,6 +177,8 @@ impl From<&Certificate> for ProofSummary {
             ultimate_bounds: bounds::by_name(&certificate.ultimate),
             mean_square_bound: mean_square.map(|b| b.norm),
             mean_square_bounds: bounds::by_name(mean_square.map_or(&[], |b| &b.states)),
+            probable_bound: probable.map(|b| b.norm),
+            probable_bounds: bounds::by_name(probable.map_or(&[], |b| &b.states)),
             region: sides(&certificate.region),
             constants: constants.collect(),
         }

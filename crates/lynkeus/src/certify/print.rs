@@ -3,6 +3,7 @@
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Line, Table};
 use lynkeus_observers::Certificate;
+use lynkeus_proof::noise::PROBABILITY;
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 use serde_json::Value;
@@ -208,6 +209,12 @@ fn certificate(document: &mut Document, report: &CertifyReport, certificate: &Ce
     if let Some(found) = &certificate.mean_square {
         let bounds = bounds::in_words(report, &found.states).join(", ");
         document.item(format!("{IN_MEAN_SQUARE}: {bounds}"));
+    }
+    if let Some(found) = &certificate.probable {
+        let bounds = bounds::in_words(report, &found.states).join(", ");
+        document.item(format!(
+            "in the end, at any one time with a probability of {PROBABILITY}, within: {bounds}"
+        ));
     }
     document.notes(report.notes_of(certificate));
 }
