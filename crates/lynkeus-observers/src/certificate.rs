@@ -26,10 +26,19 @@ impl ReadingError {
     /// A bound, of Gaussian noise within [`Self::DEVIATIONS`].
     #[must_use]
     pub fn bound(&self) -> f64 {
-        let [disturbed, uniform, deviation, times] =
-            [self.disturbed, self.uniform, self.deviation, Self::DEVIATIONS].map(Interval::point);
+        let [disturbed, uniform, deviation, times] = [
+            self.disturbed,
+            self.uniform,
+            self.deviation,
+            Self::DEVIATIONS,
+        ]
+        .map(Interval::point);
         // no deviation is none, however many
-        let normal = if self.deviation == 0.0 { Interval::ZERO } else { times * deviation };
+        let normal = if self.deviation == 0.0 {
+            Interval::ZERO
+        } else {
+            times * deviation
+        };
         (disturbed + uniform + normal).hi()
     }
 }

@@ -91,7 +91,13 @@ pub fn largest(P: &DMatrix<f64>, densities: &[f64]) -> Option<f64> {
     let computed = DMatrix::from_fn(n, n, |i, j| entry(i, j).midpoint());
     let guess = spectrum::symmetric(computed)?.eigenvalues.max();
     let is_above = |σ: f64| {
-        let diagonal = |i, j| if i == j { Interval::point(σ) } else { Interval::ZERO };
+        let diagonal = |i, j| {
+            if i == j {
+                Interval::point(σ)
+            } else {
+                Interval::ZERO
+            }
+        };
         is_positive_definite(&square(n, |i, j| diagonal(i, j) - entry(i, j)))
     };
     let raised = [1.0 + 1e-9, 1.0 + 1e-6, 1.001, 1.1, 2.0].map(|by| by * guess);
@@ -107,7 +113,9 @@ mod tests {
         let (count, width) = (20_000, 12.0 - a);
         let h = width / f64::from(count);
         let at = |k: i32| f(a + f64::from(k) * h);
-        let inner: f64 = (1..count).map(|k| at(k) * if k % 2 == 1 { 4.0 } else { 2.0 }).sum();
+        let inner: f64 = (1..count)
+            .map(|k| at(k) * if k % 2 == 1 { 4.0 } else { 2.0 })
+            .sum();
         (at(0) + inner + at(count)) * h / 3.0
     }
 

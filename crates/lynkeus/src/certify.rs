@@ -17,6 +17,7 @@ use lynkeus_experiment::{prepare, words};
 mod assumptions;
 mod bounds;
 mod excited;
+mod filter;
 mod json;
 mod print;
 mod sampled;
@@ -24,6 +25,7 @@ mod strays;
 mod tube;
 
 pub use excited::{AtTheta, Excitation, Excited};
+pub use filter::{FilterTube, Followed};
 pub(crate) use json::Proof;
 #[cfg(test)]
 pub(crate) use json::Report as CertificateReport;
@@ -62,6 +64,8 @@ pub struct CertifyReport {
     pub excited: Option<Excited>,
     /// whether the plant stays in the box, from the starts that the study asks about
     pub tube: Option<Tube>,
+    /// what is proved of an extended Kalman filter from these starts
+    pub filter: Option<FilterTube>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -173,6 +177,14 @@ impl<'a> Task<'a> {
         let of_samples = sampled.as_ref().is_some_and(|s: &Result<SampledDecay, _>| {
             s.as_ref().is_ok_and(|found| found.at.is_some())
         });
+        let filter = match self.explore {
+            true => FilterTube::of(&self.prepared, place, &self.study.observer.tuning)?,
+            false => None,
+        };
+        let of_samples = of_samples
+            || filter
+                .as_ref()
+                .is_some_and(|filter| filter.verdict == Standing::Proved);
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
             declared: account(self.prepared.declared(), in_mean_square, of_samples),
@@ -184,6 +196,7 @@ impl<'a> Task<'a> {
                 true => Tube::of(&self.prepared, place)?,
                 false => None,
             },
+            filter,
             design,
             certificate,
             notes,
@@ -384,8 +397,7 @@ impl CertifyReport {
 
     fn sharper(&self, of: impl Fn(&Certificate) -> Option<&Bounds>) -> Option<&Bounds> {
         let both = std::iter::once(&self.certificate).chain(&self.theorem);
-        both.filter_map(of)
-            .min_by(|a, b| a.norm.total_cmp(&b.norm))
+        both.filter_map(of).min_by(|a, b| a.norm.total_cmp(&b.norm))
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

@@ -273,7 +273,12 @@ fn noise(system: &ErrorSystem, proof: &Proof, assumptions: &Assumptions) -> Opti
         true => weighed(P, &column(system, j)).map(|c| c * Interval::point(error.deviation)),
         false => Some(Interval::ZERO),
     };
-    let normal: Option<Vec<Interval>> = assumptions.readings.iter().enumerate().map(column).collect();
+    let normal: Option<Vec<Interval>> = assumptions
+        .readings
+        .iter()
+        .enumerate()
+        .map(column)
+        .collect();
     let densities = &assumptions.process_noise;
     let diagonal = |(i, q): (usize, &f64)| Interval::point(P[(i, i)]) * Interval::point(*q);
     Some(Noise {
@@ -302,7 +307,11 @@ fn bounds(
 ) -> Option<Bounds> {
     let bound = |e: &ReadingError| Interval::point(e.bound());
     let push = push(system, &proof.P, assumptions, &bound)?;
-    finite_bounds(augmented, &proof.P, settled(proof.rate, push, Interval::ZERO))
+    finite_bounds(
+        augmented,
+        &proof.P,
+        settled(proof.rate, push, Interval::ZERO),
+    )
 }
 
 /// √(wᵀPw) at most, for drift and errors of readings of such sizes; where nothing but a bound is known of the
@@ -314,7 +323,11 @@ fn push(
     size: &dyn Fn(&ReadingError) -> Interval,
 ) -> Option<Interval> {
     let sizes: Vec<Interval> = match assumptions.readings.is_empty() {
-        true => assumptions.noise.iter().map(|ν| Interval::point(*ν)).collect(),
+        true => assumptions
+            .noise
+            .iter()
+            .map(|ν| Interval::point(*ν))
+            .collect(),
         false => assumptions.readings.iter().map(size).collect(),
     };
     let through = |i: usize| {

@@ -45,7 +45,10 @@ impl Sampled {
         let mut last = stepper.ranges();
         for time in self.times.iter().copied().filter(|time| *time <= until) {
             let end = advance(&mut stepper, time, budget, &mut last, see);
-            let Some(after) = end.is_none().then(|| stepper.jump(&self.sample, &self.errors)) else {
+            let Some(after) = end
+                .is_none()
+                .then(|| stepper.jump(&self.sample, &self.errors))
+            else {
                 return (end.unwrap_or(End::Stuck), stepper.time(), last);
             };
             let Some(after) = after else {
@@ -141,10 +144,16 @@ mod tests {
             let (k, share) = (f64::from(count), r / p);
             let radius = (share * 0.5 + k * b) / (share + k);
             let near = |found: f64, exact: f64| (found - exact).abs() < 1e-9;
-            assert!(near(last[1].hi(), radius) && near(last[1].lo(), -radius), "{last:?} {radius}");
+            assert!(
+                near(last[1].hi(), radius) && near(last[1].lo(), -radius),
+                "{last:?} {radius}"
+            );
             assert!(last[1].hi() >= radius && last[1].lo() <= -radius);
             let P = 1.0 / (1.0 / p + k / r);
-            assert!(last[2].contains(P) && last[2].width() < 1e-12, "{last:?} {P}");
+            assert!(
+                last[2].contains(P) && last[2].width() < 1e-12,
+                "{last:?} {P}"
+            );
             assert!(last[0].contains(1.0) && last[0].contains(2.0) && last[0].width() < 1.0 + 1e-9);
         }
     }
@@ -165,8 +174,17 @@ mod tests {
         assert_eq!(jumps.len(), 2);
         assert!(jumps[0].0 == 0.5 && (jumps[0].2 - 0.5).abs() < 1e-12);
         for (from, to, P) in seen.iter().filter(|part| part.0 < part.1) {
-            let exact = if *to <= 0.5 { 1.0 } else if *to <= 2.0 { 0.5 } else { 1.0 / 3.0 };
-            assert!((P - exact).abs() < 1e-9 && (*to <= 0.5 || *from >= 0.5), "{from} {to} {P}");
+            let exact = if *to <= 0.5 {
+                1.0
+            } else if *to <= 2.0 {
+                0.5
+            } else {
+                1.0 / 3.0
+            };
+            assert!(
+                (P - exact).abs() < 1e-9 && (*to <= 0.5 || *from >= 0.5),
+                "{from} {to} {P}"
+            );
         }
     }
 
@@ -189,7 +207,15 @@ mod tests {
         ];
         let S = P + r;
         let inner = ν - e;
-        let sample = [x, v, e + P / S * inner, d + Q / S * inner, r * P / S, r * Q / S, R - Q * Q / S];
+        let sample = [
+            x,
+            v,
+            e + P / S * inner,
+            d + Q / S * inner,
+            r * P / S,
+            r * Q / S,
+            R - Q * Q / S,
+        ];
         let (b, every) = (0.02, 0.25);
         let of = Sampled {
             flow: Problem {
@@ -199,7 +225,19 @@ mod tests {
                 constants: vec![],
                 inputs: vec![],
             },
-            first: tape(&g, &[x, v], &[x, v, 1.0 - x, -v, g.constant(0.02), g.constant(0.0), g.constant(0.02)]),
+            first: tape(
+                &g,
+                &[x, v],
+                &[
+                    x,
+                    v,
+                    1.0 - x,
+                    -v,
+                    g.constant(0.02),
+                    g.constant(0.0),
+                    g.constant(0.02),
+                ],
+            ),
             sample: tape(&g, &[x, v, e, d, P, Q, R, t, ν], &sample),
             errors: vec![b],
             times: (1..=20).map(|k| every * f64::from(k)).collect(),
@@ -216,8 +254,14 @@ mod tests {
         assert_eq!((jumps.len(), jumps.last()), (20, Some(&last)));
         eprintln!("{last:?}");
         // narrow enough to say something
-        assert!(last[2].magnitude() < 0.1 && last[3].magnitude() < 0.15, "{last:?}");
-        assert!(last[4].lo() > 0.0 && last[4].width() < 0.2 * last[4].hi(), "{last:?}");
+        assert!(
+            last[2].magnitude() < 0.1 && last[3].magnitude() < 0.15,
+            "{last:?}"
+        );
+        assert!(
+            last[4].lo() > 0.0 && last[4].width() < 0.2 * last[4].hi(),
+            "{last:?}"
+        );
         let mut seed = 1_u64;
         let mut random = || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -237,10 +281,21 @@ mod tests {
                 let S = z[4] + r;
                 let (K, inner) = ([z[4] / S, z[5] / S], reading - z[2]);
                 let after = [z[4] - K[0] * z[4], z[5] - K[0] * z[5], z[6] - K[1] * z[5]];
-                z = [z[0], z[1], z[2] + K[0] * inner, z[3] + K[1] * inner, after[0], after[1], after[2]];
+                z = [
+                    z[0],
+                    z[1],
+                    z[2] + K[0] * inner,
+                    z[3] + K[1] * inner,
+                    after[0],
+                    after[1],
+                    after[2],
+                ];
                 let own = [z[0], z[1], z[2] - z[0], z[3] - z[1], z[4], z[5], z[6]];
                 for (value, range) in own.into_iter().zip(inside) {
-                    assert!(range.inflate(1e-8).contains(value), "{run}: {value} {range}");
+                    assert!(
+                        range.inflate(1e-8).contains(value),
+                        "{run}: {value} {range}"
+                    );
                 }
                 largest = largest.max((z[2] - z[0]).abs() / inside[2].magnitude());
             }

@@ -138,7 +138,9 @@ impl<'p> Stepper<'p> {
         let seeds = &stepper.set.polynomial;
         let models = of.first.eval_in(&stepper.samples(), seeds);
         let (zonotope, reach) = (Zonotope::origin(n), vec![0.0; n]);
-        stepper.set = stepper.set.next(&stepper.ring, known(models)?, &zonotope, &reach);
+        stepper.set = stepper
+            .set
+            .next(&stepper.ring, known(models)?, &zonotope, &reach);
         Some(stepper)
     }
 

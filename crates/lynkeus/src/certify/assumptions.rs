@@ -18,7 +18,7 @@ pub(super) fn of(
 ) -> Result<Assumptions, Error> {
     let (declared, plant, region) = (prepared.declared(), augmented.plant, augmented.region());
     let drift = drift(declared, plant, augmented, &region)?;
-    let readings = readings(declared, plant, augmented, &region)?;
+    let readings = errors(declared, plant, augmented, &region)?;
     let assumptions = Assumptions::new(augmented, region).map_err(explain)?;
     let shown = |name: &str| {
         let limits = declared.limits.of(name)?;
@@ -50,6 +50,16 @@ pub(super) fn of(
         .with_input_derivatives(augmented.inputs.iter().map(derivatives).collect())
         .with_limits(augmented, &limits)
         .map_err(explain)
+}
+
+/// Bounds of the errors of readings, one per measured output.
+pub(super) fn readings(
+    prepared: &Prepared<'_>,
+    augmented: &AugmentedPlant<'_>,
+) -> Result<Vec<f64>, Error> {
+    let region = augmented.region();
+    let errors = errors(prepared.declared(), augmented.plant, augmented, &region)?;
+    Ok(errors.iter().map(ReadingError::bound).collect())
 }
 
 /// Per augmented state: what disturbances within their declared ranges add to its
@@ -129,7 +139,7 @@ fn largest_difference(
 
 /// Per measured output: how far what is measured may be from h(x, u) without disturbances.
 /// That is what these add to h, and the noise, of which a relative one counts from the disturbed value.
-fn readings(
+fn errors(
     declared: &Declared,
     plant: &Plant,
     augmented: &AugmentedPlant<'_>,

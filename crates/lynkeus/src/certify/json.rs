@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
+use super::filter::told::FilterEntry;
 use super::sampled::SampledEntry;
 use super::tube::told::TubeEntry;
 use super::{CertifyReport, Excited, Strays, bounds};
@@ -55,6 +56,8 @@ pub(crate) struct Proof<'a> {
     sampled: Option<SampledEntry>,
     /// whether the plant stays in the box from the starts of `[certify]`; null where that is not asked
     tube: Option<TubeEntry>,
+    /// what is proved of an extended Kalman filter from these starts; null for other observers
+    filter: Option<FilterEntry>,
     /// what you should know
     notes: Vec<String>,
     /// what the family's theorem gives, where it was asked
@@ -134,6 +137,7 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
             sampling: report.sampling.as_ref().map(|found| found.entry(true)),
             sampled: report.sampled.as_ref().map(SampledEntry::from),
             tube: report.tube.as_ref().map(TubeEntry::from),
+            filter: report.filter.as_ref().map(FilterEntry::from),
             notes: both
                 .flat_map(|certificate| report.notes_of(certificate))
                 .chain(report.assumed.iter().cloned())

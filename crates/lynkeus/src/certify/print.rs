@@ -63,6 +63,9 @@ impl Answer for CertifyReport {
         if let Some(tube) = &self.tube {
             tube.tell(&mut document);
         }
+        if let Some(filter) = &self.filter {
+            filter.tell(&mut document);
+        }
         if let Some(excited) = &self.excited {
             excited.tell(&mut document);
         }
@@ -110,7 +113,10 @@ fn conclusion(report: &CertifyReport) -> Line {
             Line::verdict("refuted").and(": an error grows, however small it is")
         }
         (Standing::Undecided, _) => {
-            Line::verdict("undecided").and(": neither a proof nor a counterexample")
+            let filter = report.filter.as_ref();
+            let filter = filter.map_or(String::new(), |found| format!("; {}", found.clause()));
+            Line::verdict("undecided")
+                .and(format!(": neither a proof nor a counterexample{filter}"))
         }
     }
 }
