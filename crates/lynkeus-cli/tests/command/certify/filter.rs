@@ -132,7 +132,8 @@ fn attacked(plant: &str, study: &str, corners: &[(&str, [f64; 2])], names: &[&st
             "-o",
             "run.csv",
         ]);
-        assert_eq!(run.code, 0, "{run:?}");
+        // a disturbance that the filter does not know of is no reason for it to be credible
+        assert!(run.code < 2, "{run:?}");
         let table = folder.read("run.csv");
         let mut lines = table
             .lines()

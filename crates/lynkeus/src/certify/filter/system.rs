@@ -1,9 +1,9 @@
 //! A plant beside its extended Kalman filter, as what flows and jumps.
 //!
-//! z = (x, e, P): the plant with its unknown inputs, e = x̂ − x, and the lower triangle of the
-//! covariance. Between samples
+//! z = (x, e, P, ū): the plant with its unknown inputs, e = x̂ − x, the lower triangle of the covariance, and the known inputs
+//! that vary, as the filter holds them. Between samples
 //!
-//! x' = f(x), e' = f(x + e) − f(x), P' = F P + P Fᵀ + Q with F = ∂f/∂x at x + e,
+//! x' = f(x, u), e' = f(x + e, ū) − f(x, u), P' = F P + P Fᵀ + Q with F = ∂f/∂x at x + e and ū,
 //!
 //! and a sample takes the readings h(x) + ν one after the other,
 //! K = P cᵀ/(c P cᵀ + R), e⁺ = e + K (h(x) + ν − h(x̂⁻) − c (e − e⁻)), P⁺ = P − K c P,
@@ -18,7 +18,7 @@ use lynkeus_proof::tube::{Problem, Sampled};
 use lynkeus_run::Level;
 use lynkeus_run::filter::FilterKind;
 use lynkeus_structure::AugmentedPlant;
-use lynkeus_study::{Name, Noise};
+use lynkeus_study::{BetweenSamples, Name, Noise};
 
 use super::super::assumptions;
 use super::super::tube::{bounded, first_of, refuse_others, side};
@@ -97,11 +97,17 @@ impl System {
         notes.extend(remarks(prepared));
         let plant = prepared.plant();
         let graph = augmented.graph();
-        let symbols = Symbols::of(graph, augmented, observer);
         let mut known = HashMap::new();
         for input in &augmented.inputs {
             known.insert(input.node, input_expression(study, plant, run, input)?);
         }
+        let varies = |u: &&Variable| graph.constant_value(known[&u.node]).is_none();
+        let varying = augmented.inputs.iter().filter(varies);
+        let varying: Vec<Node> = varying.map(|u| u.node).collect();
+        if !varying.is_empty() && study.estimate.between_samples == BetweenSamples::Linear {
+            return Ok(Err("the tube of a filter follows known inputs that it holds between samples, not `between_samples = \"linear\"`".to_owned()));
+        }
+        let symbols = Symbols::of(graph, augmented, observer, varying);
         let (actual, inputs) = symbols.actual(prepared, augmented);
         let noises = variances(prepared.declared(), augmented);
         let model = Model {
@@ -130,7 +136,10 @@ impl System {
                 constants: vec![],
                 inputs: bounded(prepared, &inputs)?,
             },
-            first: tape(&symbols.x, &model.first(&estimate, variance))?,
+            first: tape(
+                &symbols.x,
+                &model.first(&estimate, variance, (plant.time, from)),
+            )?,
             sample: tape(&with(&symbols.errors), &sample)?,
             errors: assumptions::readings(prepared, augmented)?,
             times: (0..=count as usize)
@@ -249,7 +258,7 @@ fn remarks(prepared: &Prepared<'_>) -> Vec<String> {
         .iter()
         .any(|(_, noise)| matches!(noise, Noise::Absolute(_)));
     [
-        Some("of the filter in exact arithmetic, with known inputs that are the plant's own at every instant: what its integrator leaves is not counted".to_owned()),
+        Some("of the filter in exact arithmetic, which holds known inputs from sample to sample: what its integrator leaves is not counted".to_owned()),
         moves.then(|| "the filter counts the process noise in P, but the plant is followed without it: Gaussian noise leaves every bound".to_owned()),
         is_gaussian.then(|| "Gaussian readings are taken to lie within 3 standard deviations, all of them, however they conspire".to_owned()),
     ]
@@ -307,10 +316,18 @@ struct Symbols {
     e: Vec<Node>,
     P: Vec<Node>,
     errors: Vec<Node>,
+    /// known inputs that vary, and as the filter holds them
+    varying: Vec<Node>,
+    held: Vec<Node>,
 }
 
 impl Symbols {
-    fn of(graph: &Graph, augmented: &AugmentedPlant<'_>, observer: &Observer) -> Self {
+    fn of(
+        graph: &Graph,
+        augmented: &AugmentedPlant<'_>,
+        observer: &Observer,
+        varying: Vec<Node>,
+    ) -> Self {
         let n = augmented.states.len();
         let fresh = |name: &str, count: usize| -> Vec<Node> {
             (0..count).map(|_| graph.fresh(name).node()).collect()
@@ -325,11 +342,13 @@ impl Symbols {
             e: fresh("e", n),
             P: fresh("P", n * (n + 1) / 2),
             errors: fresh("ν", augmented.outputs.len()),
+            held: fresh("held", varying.len()),
+            varying,
         }
     }
 
     fn all(&self) -> Vec<Node> {
-        [&self.x[..], &self.e, &self.P].concat()
+        [&self.x[..], &self.e, &self.P, &self.held].concat()
     }
 
     /// x' of the plant, and what drives it that nobody knows: disturbances, and v' of the unknown inputs
@@ -390,29 +409,51 @@ impl<'g> Model<'_, 'g> {
 
     /// With the known inputs as they are, and the estimate as x + e.
     fn put(&self, nodes: &[Node]) -> Vec<Expr<'g>> {
+        self.put_with(nodes, self.known.clone())
+    }
+
+    /// The same with the known inputs as the filter holds them.
+    fn put_held(&self, nodes: &[Node]) -> Vec<Expr<'g>> {
+        let (mut known, symbols) = (self.known.clone(), self.symbols);
+        let held = symbols.varying.iter().copied();
+        known.extend(held.zip(symbols.held.iter().copied()));
+        self.put_with(nodes, known)
+    }
+
+    fn put_with(&self, nodes: &[Node], mut map: HashMap<Node, Node>) -> Vec<Expr<'g>> {
         let symbols = self.symbols;
-        let mut map = self.known.clone();
         for ((&hat, &x), &e) in symbols.hats.iter().zip(&symbols.x).zip(&symbols.e) {
             map.insert(hat, (self.expr(x) + self.expr(e)).node());
         }
         self.exprs(&self.graph.substitute(nodes, &map))
     }
 
-    /// Functions of the estimate with their slopes by its states.
-    fn linearised(&self, nodes: &[Node]) -> (Vec<Expr<'g>>, Vec<Vec<(usize, Expr<'g>)>>) {
+    /// Slopes of functions of the estimate by its states.
+    fn slopes(
+        &self,
+        nodes: &[Node],
+        put: impl Fn(&[Node]) -> Vec<Expr<'g>>,
+    ) -> Vec<Vec<(usize, Expr<'g>)>> {
         let slopes = jacobian::forward(self.graph, nodes, &self.symbols.hats);
         let row = |i: usize| {
             let (places, slopes): (Vec<usize>, Vec<Node>) = slopes.row(i).unzip();
-            let slopes = places.into_iter().zip(self.put(&slopes));
+            let slopes = places.into_iter().zip(put(&slopes));
             slopes
                 .filter(|(_, c)| self.graph.constant_value(c.node()) != Some(0.0))
                 .collect()
         };
-        (self.put(nodes), (0..nodes.len()).map(row).collect())
+        (0..nodes.len()).map(row).collect()
+    }
+
+    /// The known inputs that vary, at a time.
+    fn varying(&self) -> Vec<Node> {
+        self.symbols.varying.iter().map(|u| self.known[u]).collect()
     }
 
     /// z₀
-    fn first(&self, estimate: &[f64], variance: &[f64]) -> Vec<Node> {
+    fn first(&self, estimate: &[f64], variance: &[f64], (time, from): (Node, f64)) -> Vec<Node> {
+        let at = HashMap::from([(time, self.graph.constant(from).node())]);
+        let held = self.graph.substitute(&self.varying(), &at);
         let x = self.exprs(&self.symbols.x);
         let e = estimate.iter().zip(&x).map(|(&start, &x)| start - x);
         let P = (0..x.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
@@ -422,13 +463,15 @@ impl<'g> Model<'_, 'g> {
             .copied()
             .chain(e)
             .chain(P.map(|p| self.graph.constant(p)));
-        all.map(Expr::node).collect()
+        all.map(Expr::node).chain(held).collect()
     }
 
     /// z', for x' of the plant and the densities Q.
     fn flow(&self, actual: &[Node], densities: &[f64]) -> Vec<Node> {
         let n = self.symbols.x.len();
-        let (estimated, F) = self.linearised(&self.observer.derivatives[..n]);
+        let derivatives = &self.observer.derivatives[..n];
+        let estimated = self.put_held(derivatives);
+        let F = self.slopes(derivatives, |nodes| self.put_held(nodes));
         let actual = self.put(actual);
         let e = estimated.iter().zip(&actual).map(|(&hat, &x)| hat - x);
         let P = self.exprs(&self.symbols.P);
@@ -444,6 +487,8 @@ impl<'g> Model<'_, 'g> {
                 all.push(if i == j { both + densities[i] } else { both }.node());
             }
         }
+        let still = self.graph.constant(0.0).node();
+        all.extend(self.symbols.held.iter().map(|_| still));
         all
     }
 
@@ -455,7 +500,8 @@ impl<'g> Model<'_, 'g> {
             .filter
             .as_ref()
             .map_or(&[][..], |f| &f.outputs);
-        let (predicted, slopes) = self.linearised(outputs);
+        let predicted = self.put(outputs);
+        let slopes = self.slopes(outputs, |nodes| self.put(nodes));
         let seen: Vec<Node> = self
             .augmented
             .outputs
@@ -500,6 +546,7 @@ impl<'g> Model<'_, 'g> {
             P = next;
         }
         let x = self.exprs(&self.symbols.x);
-        x.into_iter().chain(e).chain(P).map(Expr::node).collect()
+        let all = x.into_iter().chain(e).chain(P).map(Expr::node);
+        all.chain(self.varying()).collect()
     }
 }
