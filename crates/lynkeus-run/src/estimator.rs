@@ -62,8 +62,36 @@ pub struct Estimator {
     /// inputs of which the last value holds
     held: usize,
     runner: Box<dyn Runner>,
-    /// the state before the call under way
+    kept: Kept,
+}
+
+/// Calls between two images of a state.
+const CALLS: usize = 16;
+
+/// What brings back the state before a call that fails: an image of a state, and the calls since then, which lead
+/// from it to that one again, to the last bit. So few calls pay for an image.
+#[derive(Clone, Debug, Default)]
+struct Kept {
+    /// nothing where the state is another one since then
     image: Vec<u64>,
+    calls: usize,
+    /// of each call the time, whether there were signals, and the signals
+    since: Vec<f64>,
+}
+
+impl Kept {
+    fn forget(&mut self) {
+        self.image.clear();
+    }
+
+    fn add(&mut self, t: f64, signals: Option<&[f64]>, count: usize) {
+        self.calls += 1;
+        self.since.extend([t, f64::from(signals.is_some())]);
+        match signals {
+            Some(signals) => self.since.extend_from_slice(signals),
+            None => self.since.resize(self.calls * (2 + count), 0.0),
+        }
+    }
 }
 
 impl Blueprint {
@@ -94,7 +122,7 @@ impl Estimator {
             time: None,
             held: 0,
             runner,
-            image: vec![],
+            kept: Kept::default(),
             blueprint: Arc::new(blueprint),
         })
     }
@@ -116,11 +144,7 @@ impl Estimator {
     pub fn predict(&mut self, t: f64) -> Result<&[f64]> {
         self.started()?;
         check_time(self.time, t)?;
-        self.save();
-        let before = self.time.replace(t);
-        self.signals[..self.sensors].fill(f64::NAN);
-        self.held = 0;
-        self.settle(before, false)
+        self.call(t, None)
     }
 
     /// Takes signals at the time where the estimator is.
@@ -147,19 +171,12 @@ impl Estimator {
             return Err(Error::setting("number of signals", expected, signals.len()));
         }
         check_time(self.time, t)?;
-        let inputs = self.sensors..self.names.len();
+        let mut inputs = self.sensors..self.names.len();
         let missing = |i: &usize| !signals[*i].is_finite();
-        if let (None, Some(i)) = (self.time, inputs.clone().find(missing)) {
+        if let (None, Some(i)) = (self.time, inputs.find(missing)) {
             return Err(no_number(&self.names[i], signals[i]));
         }
-        self.save();
-        let before = self.time.replace(t);
-        self.signals[..self.sensors].copy_from_slice(&signals[..self.sensors]);
-        self.held = inputs.clone().filter(missing).count();
-        for i in inputs.filter(|i| signals[*i].is_finite()) {
-            self.signals[i] = signals[i];
-        }
-        self.settle(before, true)
+        self.call(t, Some(signals))
     }
 
     /// The time of the last sample.
@@ -291,6 +308,7 @@ impl Estimator {
         let refused = |fault| Error::Snapshot { fault };
         let state = snapshot::opened(snapshot, self.fingerprint()).map_err(refused)?;
         let mut restored = self.clone();
+        restored.kept.forget();
         snapshot::load(&state, |walk| restored.walk(walk, true))
             .map_err(|_| refused(SnapshotFault::Damaged))?;
         *self = restored;
@@ -334,6 +352,7 @@ impl Estimator {
         }
         check_time(None, standing.time)?;
         let mut own = self.clone();
+        own.kept.forget();
         own.time = Some(standing.time);
         own.signals[..own.sensors].fill(f64::NAN);
         for (name, signal) in own.names.iter().zip(&mut own.signals).skip(own.sensors) {
@@ -359,15 +378,6 @@ impl Estimator {
         Ok(())
     }
 
-    /// Keeps the state, for a call that fails.
-    fn save(&mut self) {
-        let mut image = std::mem::take(&mut self.image);
-        image.clear();
-        // a state that is there can be walked over
-        let _ = self.walk(&mut Walk::Save(&mut image), false);
-        self.image = image;
-    }
-
     /// The state, to [go back](Self::go_back) to; what a smoother keeps is not in it.
     pub(crate) fn image(&mut self) -> Vec<u64> {
         let mut image = vec![];
@@ -378,38 +388,72 @@ impl Estimator {
 
     /// To a state from before.
     pub(crate) fn go_back(&mut self, image: &[u64]) {
+        self.kept.forget();
         // the same walk over what it made
         let _ = snapshot::load(image, |walk| self.walk(walk, false));
     }
 
     /// Over all that the future depends on.
     pub(crate) fn walk_state(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.kept.forget();
         self.walk(walk, false)
     }
 
-    /// The observer to the sample that was taken in; back to what was saved where that fails.
-    fn settle(&mut self, before: Option<f64>, has_signals: bool) -> Result<&[f64]> {
-        if let Err(error) = self.go(before, has_signals) {
-            let image = std::mem::take(&mut self.image);
-            // the same walk over what it made
-            let _ = snapshot::load(&image, |walk| self.walk(walk, false));
-            self.image = image;
-            if self.record().is_some() {
-                // that of the sample before is gone
-                self.keep_record();
-            }
+    /// A call with signals or without; back to the state before where it fails.
+    fn call(&mut self, t: f64, signals: Option<&[f64]>) -> Result<&[f64]> {
+        self.keep();
+        if let Err(error) = self.go(t, signals) {
+            self.undo();
             return Err(error);
         }
-        if has_signals {
-            self.runner.remember();
-        }
+        self.kept.add(t, signals, self.names.len());
         Ok(self.estimate())
     }
 
-    fn go(&mut self, before: Option<f64>, has_signals: bool) -> Result<()> {
+    /// Keeps the state, for a call that fails. What a smoother keeps does not come twice.
+    fn keep(&mut self) {
+        let kept = &self.kept;
+        if !kept.image.is_empty() && kept.calls < CALLS && !self.runner.has_history() {
+            return;
+        }
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.image.clear();
+        kept.since.clear();
+        kept.since.reserve(CALLS * (2 + self.names.len()));
+        kept.calls = 0;
+        // a state that is there can be walked over
+        let _ = self.walk(&mut Walk::Save(&mut kept.image), false);
+        self.kept = kept;
+    }
+
+    /// Back to the state before the call under way.
+    fn undo(&mut self) {
+        let kept = std::mem::take(&mut self.kept);
+        // the same walk over what it made
+        let _ = snapshot::load(&kept.image, |walk| self.walk(walk, false));
+        for call in kept.since.chunks_exact(2 + self.names.len()) {
+            let (t, signals) = (call[0], (call[1] > 0.0).then_some(&call[2..]));
+            // it was done before
+            let _ = self.go(t, signals);
+        }
+        if self.record().is_some() {
+            // that of the sample before is gone
+            self.keep_record();
+        }
+        self.kept = kept;
+        self.kept.forget();
+    }
+
+    fn go(&mut self, t: f64, signals: Option<&[f64]>) -> Result<()> {
+        let before = self.time.replace(t);
+        self.held = 0;
+        match signals {
+            Some(signals) => self.take(signals),
+            None => self.signals[..self.sensors].fill(f64::NAN),
+        }
         let (readings, inputs) = self.signals.split_at(self.sensors);
         let sample = Sample {
-            t: self.time.unwrap_or_default(),
+            t,
             readings,
             inputs,
             held: self.held,
@@ -417,13 +461,30 @@ impl Estimator {
         let runner = &mut self.runner;
         match before {
             None => runner.begin(&sample)?,
-            Some(before) if sample.t > before => runner.advance(before, &sample)?,
+            Some(before) if t > before => runner.advance(before, &sample)?,
             Some(_) => {}
         }
-        if has_signals {
+        if signals.is_some() {
             runner.update(&sample)?;
         }
-        runner.report(sample.t)
+        runner.report(t)?;
+        if signals.is_some() {
+            runner.remember();
+        }
+        Ok(())
+    }
+
+    /// Signals; of an input that is missing the last value holds.
+    fn take(&mut self, signals: &[f64]) {
+        let (readings, inputs) = signals.split_at(self.sensors);
+        let (own, last) = self.signals.split_at_mut(self.sensors);
+        own.copy_from_slice(readings);
+        for (last, input) in last.iter_mut().zip(inputs) {
+            match input.is_finite() {
+                true => *last = *input,
+                false => self.held += 1,
+            }
+        }
     }
 
     /// Over all that the future depends on, and what a smoother keeps where that is asked for.

@@ -71,8 +71,12 @@ pub(crate) trait Runner: Persist + Debug + Send + Sync {
         None
     }
 
-    /// Keeps the last update for a smoother.
+    /// Keeps the last update for a smoother, where it has a history.
     fn remember(&mut self) {}
+
+    fn has_history(&self) -> bool {
+        false
+    }
 
     /// The estimate at each update given later ones, up to `lag` of them; none without history.
     fn smoothed(&self, _lag: Option<usize>, _deviations: bool) -> Option<Vec<Smoothed>> {

@@ -327,7 +327,7 @@ fn read(root: &mut Root, state: usize, views: &[(usize, f64)], deviation: f64) {
     let places = (0..n).flat_map(|k| (0..n).map(move |i| i * n + k));
     let mut rows: Vec<f64> = places.map(|place| root.entries[place]).collect();
     rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
-    root.of_rows(&mut rows, &mut vec![0.0; n]);
+    root.of_rows(&mut rows, &mut vec![]);
 }
 
 #[cfg(test)]

@@ -109,7 +109,7 @@ impl Standing {
         match is_lower {
             // to the bit
             true => root.entries.clone_from(entries),
-            false => root.of_rows(&mut rows, &mut vec![0.0; n]),
+            false => root.of_rows(&mut rows, &mut vec![]),
         }
         Ok(())
     }

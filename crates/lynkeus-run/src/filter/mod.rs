@@ -461,6 +461,10 @@ impl Runner for Filter {
         });
     }
 
+    fn has_history(&self) -> bool {
+        self.history.is_some()
+    }
+
     /// None where a window reaches back less far than `lag`, either.
     fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
         let history = self.history.as_ref()?;

@@ -56,6 +56,11 @@ impl Profile {
         places.for_each(|(place, entry)| *place = entry);
     }
 
+    /// Its rows, and columns.
+    pub fn size(&self) -> usize {
+        self.n
+    }
+
     /// Columns of row i that may differ from 0.
     pub fn span(&self, i: usize) -> Range<usize> {
         self.spans[i].clone()

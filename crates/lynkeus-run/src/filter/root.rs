@@ -1,5 +1,7 @@
 //! Square roots of covariances: P = S Sᵀ, matrices row by row.
 
+use std::ops::Range;
+
 /// A lower triangular root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Root {
@@ -68,7 +70,7 @@ impl Root {
         for (i, row) in self.entries.chunks_exact(n.max(1)).enumerate() {
             (0..n).for_each(|k| rows[k * n + i] = row[k]);
         }
-        self.of_rows(&mut rows, &mut vec![0.0; n]);
+        self.of_rows(&mut rows, &mut vec![]);
     }
 
     /// φ with φS = b; components along which P has no variance but this share of what the state has are 0.
@@ -129,8 +131,7 @@ impl Root {
 
     /// The lower triangular root of AᵀA, for the rows A (each of n entries): what is left of A
     /// after Householder's reflections. The diagonal is not negative.
-    /// `room` is for n numbers.
-    pub fn of_rows(&mut self, rows: &mut [f64], room: &mut [f64]) {
+    pub fn of_rows(&mut self, rows: &mut [f64], room: &mut Reflector) {
         let n = self.n;
         triangularise(rows, n, room);
         self.entries.fill(0.0);
@@ -158,48 +159,94 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
-/// Reflections that make the first n rows of A upper triangular; row by row, so that
-/// memory is read in order.
-fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
+/// The entries of a reflector that are not 0, and where the rows that they change begin.
+pub(crate) type Reflector = Vec<(usize, f64)>;
+
+/// Reflections that make the first n rows of A upper triangular.
+fn triangularise(rows: &mut [f64], n: usize, reflector: &mut Reflector) {
     let count = rows.len() / n.max(1);
     for k in 0..n.min(count) {
-        let Some(unit) = unit((k..count).map(|i| rows[i * n + k])) else {
-            continue;
-        };
+        let column = (k..count).map(|i| (i * n, rows[i * n + k]));
+        reflector.clear();
+        reflector.extend(column.filter(|(_, entry)| *entry != 0.0));
         // in units in which squares neither vanish nor overflow: what decays without noise comes
         // to any size, and must not spoil what it is correlated with
-        (k..count).for_each(|i| rows[i * n + k] /= unit);
-        let squares = (k..count).map(|i| rows[i * n + k].powi(2));
+        let Some(unit) = unit(reflector.iter().map(|(_, entry)| *entry)) else {
+            continue;
+        };
+        let over = 1.0 / unit;
+        reflector.iter_mut().for_each(|(_, entry)| *entry *= over);
+        let squares = reflector.iter().map(|(_, entry)| entry.powi(2));
         let norm = squares.sum::<f64>().sqrt();
-        let pivot = rows[k * n + k];
+        let pivot = rows[k * n + k] * over;
         let head = if pivot > 0.0 { -norm } else { norm };
-        // the reflector v = (pivot − head, the rest), H = I − v vᵀ/β
-        let v0 = pivot - head;
-        let beta = -head * v0;
-        rows[k * n + k] = v0;
-        sums[k + 1..].fill(0.0);
-        for row in rows.chunks_exact(n).skip(k).filter(|row| row[k] != 0.0) {
-            for (sum, a) in sums[k + 1..].iter_mut().zip(&row[k + 1..]) {
-                *sum += row[k] * a;
-            }
+        // v = (pivot − head, the rest), H = I − v vᵀ/β, β = −head·v₀
+        let first = pivot - head;
+        match reflector.first_mut() {
+            Some((row, entry)) if *row == k * n => *entry = first,
+            _ => reflector.insert(0, (k * n, first)),
         }
-        for row in rows.chunks_exact_mut(n).skip(k) {
-            let factor = std::mem::take(&mut row[k]) / beta;
-            if factor == 0.0 {
-                continue;
-            }
-            for (a, sum) in row[k + 1..].iter_mut().zip(&sums[k + 1..]) {
-                *a -= factor * sum;
-            }
+        reflect(rows, k + 1..n, reflector, -head * first);
+        for (row, _) in &*reflector {
+            rows[row + k] = 0.0;
         }
         rows[k * n + k] = head * unit;
+    }
+}
+
+/// Takes v vᵀA/β from some columns of A, in blocks whose sums stay in registers.
+fn reflect(rows: &mut [f64], columns: Range<usize>, reflector: &[(usize, f64)], beta: f64) {
+    let mut first = columns.start;
+    while columns.end - first >= 8 {
+        reflect_block::<8>(rows, first, reflector, beta);
+        first += 8;
+    }
+    let rest = columns.end - first;
+    if rest & 4 > 0 {
+        reflect_block::<4>(rows, first, reflector, beta);
+        first += 4;
+    }
+    if rest & 2 > 0 {
+        reflect_block::<2>(rows, first, reflector, beta);
+        first += 2;
+    }
+    if rest & 1 > 0 {
+        reflect_block::<1>(rows, first, reflector, beta);
+    }
+}
+
+fn reflect_block<const W: usize>(
+    rows: &mut [f64],
+    first: usize,
+    reflector: &[(usize, f64)],
+    beta: f64,
+) {
+    let mut sums = [0.0; W];
+    for (row, v) in reflector {
+        let Some(block) = rows[row + first..].first_chunk::<W>() else {
+            return;
+        };
+        for (sum, a) in sums.iter_mut().zip(block) {
+            *sum += v * a;
+        }
+    }
+    for (row, v) in reflector {
+        let Some(block) = rows[row + first..].first_chunk_mut::<W>() else {
+            return;
+        };
+        let factor = v / beta;
+        for (a, sum) in block.iter_mut().zip(&sums) {
+            *a -= factor * sum;
+        }
     }
 }
 
 /// The power of two of the largest of some numbers; none where all are as good as zero.
 fn unit(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff << 52;
-    let power = f64::from_bits(largest(numbers).to_bits() & EXPONENT);
+    // of magnitudes the bits are in order
+    let largest = numbers.fold(0, |all, x| x.abs().to_bits().max(all));
+    let power = f64::from_bits(largest & EXPONENT);
     (power > 0.0).then_some(power)
 }
 
@@ -297,14 +344,14 @@ mod tests {
             })
             .collect();
         let mut root = Root::diagonal(&[0.0; 3]);
-        root.of_rows(&mut rows.clone(), &mut [0.0; 3]);
+        root.of_rows(&mut rows.clone(), &mut vec![]);
         close(&covariance(&root), &expected, 1e-13);
         assert!(
             (0..3).all(|i| root.row(i)[i] >= 0.0 && root.row(i)[i + 1..].iter().all(|s| *s == 0.0))
         );
         // fewer rows than columns: rank one
         let mut flat = Root::diagonal(&[0.0; 3]);
-        flat.of_rows(&mut [1.0, 2.0, 3.0], &mut [0.0; 3]);
+        flat.of_rows(&mut [1.0, 2.0, 3.0], &mut vec![]);
         close(
             &covariance(&flat),
             &[1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 3.0, 6.0, 9.0],
@@ -318,7 +365,7 @@ mod tests {
         for exponent in -1080..=1000 {
             let tiny = 1.3 * 2.0_f64.powi(exponent);
             let mut root = Root::diagonal(&[0.0; 2]);
-            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7], &mut [0.0; 2]);
+            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7], &mut vec![]);
             let found = root.deviation(1).powi(2);
             assert!((found - 2.29).abs() < 1e-14, "{found} beside {tiny:e}");
         }

@@ -5,7 +5,7 @@ use super::censored::Believed;
 use super::model::NoisyModel;
 use super::point::Point;
 use super::profile::Profile;
-use super::root::{Factor, Root, dot, substitute};
+use super::root::{Factor, Reflector, Root, dot, substitute};
 use super::sensing::Sensing;
 use super::settings::{SigmaPoints, Weights};
 use super::smoother::Correction;
@@ -36,7 +36,7 @@ pub(crate) struct Ukf {
     expected: Vec<f64>,
     rows: Vec<f64>,
     extra: Vec<f64>,
-    sums: Vec<f64>,
+    reflector: Reflector,
     factor: Factor,
     manifold: Manifold,
     /// states that events alone change, without a deviation
@@ -66,7 +66,7 @@ impl Ukf {
             expected: vec![],
             rows: vec![],
             extra: vec![],
-            sums: vec![],
+            reflector: vec![],
             factor: Factor::default(),
         })
     }
@@ -194,10 +194,9 @@ impl Ukf {
                 rows.extend(d.iter().map(|x| weight * x));
             }
             rows.extend_from_slice(&self.extra);
-            self.sums.resize(n, 0.0);
             match self.jumps {
-                true => root_of_moving(rows, &mut self.sums, root),
-                false => root.of_rows(rows, &mut self.sums),
+                true => root_of_moving(rows, &mut self.reflector, root),
+                false => root.of_rows(rows, &mut self.reflector),
             }
             return;
         }
@@ -420,12 +419,12 @@ impl Ukf {
 
 /// The lower root of AᵀA for rows A, without a column for states that do not differ: what stands there else depends on
 /// rounding, and so would the points.
-fn root_of_moving(rows: &mut [f64], sums: &mut [f64], root: &mut Root) {
+fn root_of_moving(rows: &mut [f64], room: &mut Reflector, root: &mut Root) {
     let n = root.n;
     let moves = |i: &usize| rows.iter().skip(*i).step_by(n).any(|x| *x != 0.0);
     let moving: Vec<usize> = (0..n).filter(moves).collect();
     if moving.len() == n {
-        return root.of_rows(rows, sums);
+        return root.of_rows(rows, room);
     }
     for row in rows.chunks_exact_mut(n) {
         for (place, &i) in moving.iter().enumerate() {
@@ -433,7 +432,7 @@ fn root_of_moving(rows: &mut [f64], sums: &mut [f64], root: &mut Root) {
         }
         row[moving.len()..].fill(0.0);
     }
-    root.of_rows(rows, sums);
+    root.of_rows(rows, room);
     let packed = root.entries.clone();
     root.entries.fill(0.0);
     for (a, i) in moving.iter().enumerate() {

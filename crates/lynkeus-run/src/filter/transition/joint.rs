@@ -88,8 +88,8 @@ impl Joint {
         Ok(())
     }
 
-    /// Takes a belief to the next sample where that is one step, and one function; the transition is
-    /// [written](Self::write_last) when somebody asks for it.
+    /// Takes the state of a belief to the next sample where that is one step, and one function; the transition is
+    /// [written](Self::write_last) when somebody asks for it, and its root may be [taken](Self::take).
     pub fn leap(
         &mut self,
         driven: &mut Evaluation,
@@ -111,14 +111,12 @@ impl Joint {
         if !straight.run(driven, (from, h), &belief.x, noise, &belief.root) {
             return false;
         }
-        // where a covariance is finite, so is what it was made of
-        let is_sound = are_finite(&straight.next()[..self.equation.n]);
-        let is_carried = is_sound && straight.take(&mut belief.root);
-        if is_carried {
-            let x = &straight.next()[..self.equation.n];
-            belief.x.copy_from_slice(x);
+        let next = straight.next();
+        let is_sound = are_finite(next);
+        if is_sound {
+            belief.x.copy_from_slice(&next[..self.equation.n]);
         }
-        is_carried
+        is_sound
     }
 
     /// Goes on by the loops alone.

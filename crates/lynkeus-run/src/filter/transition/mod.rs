@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::belief::Belief;
 use super::profile::Profile;
-use super::root::{Factor, Root, dot};
+use super::root::{Factor, Reflector, Root, dot};
 use crate::Evaluation;
 use crate::events::Memory;
 use crate::manifold::Manifold;
@@ -43,7 +43,7 @@ pub(crate) struct Propagation {
     /// W in that order
     ordered: Vec<f64>,
     rows: Vec<f64>,
-    sums: Vec<f64>,
+    room: Room,
     /// so many last states are drawn anew in every row
     drawn: usize,
 }
@@ -80,7 +80,7 @@ impl Propagation {
             order: order.flatten(),
             ordered: vec![],
             rows: vec![],
-            sums: vec![0.0; n],
+            room: Room::default(),
             drawn: 0,
         })
     }
@@ -109,14 +109,14 @@ impl Propagation {
 
     /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. A flow that fails leaves the belief as it was.
     pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<()> {
-        if let Scheme::Joint(joint) = &mut self.scheme
-            && joint.leap(&mut self.driven, belief, from, to)
-        {
-            self.is_behind = true;
-            return Ok(());
+        self.is_behind = match &mut self.scheme {
+            Scheme::Joint(joint) => joint.leap(&mut self.driven, belief, from, to),
+            Scheme::Piecewise(_) => false,
+        };
+        if !self.is_behind {
+            self.advance(belief, from, to)?;
+            belief.x.clone_from(&self.end);
         }
-        self.advance(belief, from, to)?;
-        belief.x.clone_from(&self.end);
         let is_carried = match &mut self.scheme {
             Scheme::Joint(joint) => joint.take(&mut belief.root),
             Scheme::Piecewise(_) => false,
@@ -133,7 +133,7 @@ impl Propagation {
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
         self.push_root(&mut rows);
-        carry(&self.transition.matrix, root, &mut rows, &mut self.sums);
+        carry(&self.transition.matrix, root, &mut rows, &mut self.room);
         self.rows = rows;
     }
 
@@ -191,7 +191,7 @@ impl Propagation {
         let Some(noise) = &self.transition.noise else {
             return;
         };
-        let n = self.sums.len();
+        let n = self.transition.matrix.size();
         let mut entries = noise.entries();
         if let Some(order) = &self.order {
             let pairs = order.iter().flat_map(|i| order.iter().map(move |j| (i, j)));
@@ -289,8 +289,7 @@ impl Stage {
         let moved = self.end.iter().zip(self.transition.rows());
         let x = moved.map(|(x, (first, row))| x + dot(row, &off[first..]));
         let (mut root, mut rows) = (after.root.clone(), self.noise.clone());
-        let mut sums = vec![0.0; off.len()];
-        carry(&self.transition, &mut root, &mut rows, &mut sums);
+        carry(&self.transition, &mut root, &mut rows, &mut Room::default());
         Belief {
             x: x.collect(),
             root,
@@ -298,15 +297,25 @@ impl Stage {
     }
 }
 
+/// Room to carry a root in.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    sums: Vec<f64>,
+    reflector: Reflector,
+}
+
 /// ΦPΦᵀ + W, where `rows` are those of W: they come first, since their zeros are spared in the
-/// reflections. `sums` is room for a number of each state.
-fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut [f64]) {
+/// reflections.
+fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, room: &mut Room) {
+    let Room { sums, reflector } = room;
+    sums.resize(root.n, 0.0);
     let n = root.n;
     let begin = rows.len();
     rows.resize(begin + n * n, 0.0);
     for (i, (first, row)) in transition.rows().enumerate() {
         sums.fill(0.0);
-        for (j, phi) in (first..).zip(row) {
+        let entries = (first..).zip(row);
+        for (j, phi) in entries.filter(|(_, phi)| **phi != 0.0) {
             for (sum, s) in sums.iter_mut().zip(&root.row(j)[..=j]) {
                 *sum += phi * s;
             }
@@ -314,7 +323,7 @@ fn carry(transition: &Profile, root: &mut Root, rows: &mut Vec<f64>, sums: &mut 
         let column = rows[begin + i..].iter_mut().step_by(n);
         column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
     }
-    root.of_rows(rows, sums);
+    root.of_rows(rows, reflector);
 }
 
 #[cfg(test)]
