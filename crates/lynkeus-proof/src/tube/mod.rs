@@ -32,7 +32,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::{Budget, Spent};
 
-pub use sampled::Sampled;
+pub use sampled::{Sampled, See};
 use step::Stepper;
 pub use step::{Problem, Segment};
 

@@ -28,6 +28,9 @@ pub struct Sampled {
     pub times: Vec<f64>,
 }
 
+/// Who looks at the parts of a tube: from when, to when, in which ranges.
+pub type See<'s> = dyn FnMut(f64, f64, &[Interval]) -> ControlFlow<()> + 's;
+
 impl Sampled {
     /// Integrates until a time, shows from when to when z is in which ranges, a sample as a part without length, and
     /// says where and why it ended, and in which ranges z is then.
@@ -37,9 +40,10 @@ impl Sampled {
         &self,
         until: f64,
         budget: &Budget,
-        see: &mut dyn FnMut(f64, f64, &[Interval]) -> ControlFlow<()>,
+        see: &mut See<'_>,
     ) -> (End, f64, Vec<Interval>) {
-        let Some(mut stepper) = Stepper::lifted(self, until) else {
+        let errors = self.errors.len();
+        let Some(mut stepper) = Stepper::lifted(&self.flow, &self.first, errors, until) else {
             return (End::Stuck, self.flow.from, vec![]);
         };
         let mut last = stepper.ranges();
@@ -70,7 +74,7 @@ fn advance(
     until: f64,
     budget: &Budget,
     last: &mut Vec<Interval>,
-    see: &mut dyn FnMut(f64, f64, &[Interval]) -> ControlFlow<()>,
+    see: &mut See<'_>,
 ) -> Option<End> {
     stepper.aim(until);
     while stepper.time() < until {

@@ -7,7 +7,6 @@ use lynkeus_expr::{Budget, Interval, Tape};
 use super::algebra::Models;
 use super::model::{Model, raised};
 use super::ring::{Part, Ring};
-use super::sampled::Sampled;
 use super::zonotope::Zonotope;
 
 /// Powers of τ.
@@ -130,13 +129,13 @@ impl<'p> Stepper<'p> {
         }
     }
 
-    /// From what `first` makes of the start set, with symbols for the errors of a sample.
-    pub fn lifted(of: &'p Sampled, until: f64) -> Option<Self> {
-        let n = of.first.outputs();
-        let mut stepper = Self::with(&of.flow, until, n + of.errors.len());
+    /// From what `first` makes of the start set, with symbols for so many errors of a sample.
+    pub fn lifted(flow: &'p Problem, first: &Tape, errors: usize, until: f64) -> Option<Self> {
+        let n = first.outputs();
+        let mut stepper = Self::with(flow, until, n + errors);
         stepper.scale = vec![0.0; n];
         let seeds = &stepper.set.polynomial;
-        let models = of.first.eval_in(&stepper.samples(), seeds);
+        let models = first.eval_in(&stepper.samples(), seeds);
         let (zonotope, reach) = (Zonotope::origin(n), vec![0.0; n]);
         stepper.set = stepper
             .set

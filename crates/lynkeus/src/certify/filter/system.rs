@@ -481,10 +481,10 @@ impl<'g> Model<'_, 'g> {
         };
         let mut all: Vec<Node> = actual.iter().map(|x| x.node()).collect();
         all.extend(e.map(Expr::node));
-        for i in 0..n {
+        for (i, &density) in densities.iter().enumerate() {
             for j in 0..=i {
                 let both = along(i, j) + along(j, i);
-                all.push(if i == j { both + densities[i] } else { both }.node());
+                all.push(if i == j { both + density } else { both }.node());
             }
         }
         let still = self.graph.constant(0.0).node();

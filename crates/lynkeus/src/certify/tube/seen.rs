@@ -8,7 +8,7 @@ use lynkeus_experiment::words::number;
 const ROWS: usize = 200;
 
 /// Where the states are, in equal parts of the time.
-pub(in super::super) struct Seen {
+pub(crate) struct Seen {
     pub rows: Vec<Row>,
     /// until when
     pub reached: f64,
@@ -82,7 +82,7 @@ fn join(all: &mut Vec<Interval>, ranges: &[Interval]) {
 }
 
 /// Four significant digits that hold all of the range.
-pub(in super::super) fn outward(range: Interval) -> String {
+pub(crate) fn outward(range: Interval) -> String {
     let digits = |x: f64, up: bool| {
         if x == 0.0 || !x.is_finite() {
             return number(x);
