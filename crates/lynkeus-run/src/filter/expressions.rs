@@ -24,16 +24,16 @@ pub(crate) struct Flow<'f, 'g> {
 }
 
 impl<'f, 'g> Flow<'f, 'g> {
-    /// Of equations with noise on such states; none where there would be too much of it, were Φ and W full.
+    /// Of equations with noise on such states.
     pub fn of(
         graph: &'g Graph,
         equations: &'f Equations,
         jacobian: &'f Jacobian,
         noisy: &[bool],
-    ) -> Option<Self> {
+    ) -> Self {
         let free = &equations.roots.free;
         let noise = noisy.iter().map(|n| n.then(|| graph.fresh("q")));
-        let flow = Flow {
+        Flow {
             graph,
             inputs: &equations.inputs[..equations.smooth_inputs()],
             derivatives: &free.derivatives,
@@ -41,8 +41,44 @@ impl<'f, 'g> Flow<'f, 'g> {
             places: jacobian.places(),
             noise: noise.collect(),
             least_square: 0.0,
-        };
-        (16 * noisy.len() * flow.places.len() <= LARGEST_STEP).then_some(flow)
+        }
+    }
+
+    /// The same where a step from anywhere is not too much, which fills Φ and W.
+    pub fn small(self) -> Option<Self> {
+        let operations = 16 * self.states() * self.places.len();
+        (operations <= LARGEST_STEP).then_some(self)
+    }
+
+    /// The same where the first step from a sample is not too much: from Φ = I and W = 0 it reaches a few places
+    /// further in each of its stages.
+    pub fn small_at_first(self) -> Option<Self> {
+        let (n, width) = (self.states(), self.width());
+        let start: Vec<bool> = (0..n * width).map(|k| k % width == k / width).collect();
+        let (mut rows, mut operations) = (start, 0);
+        for _ in 0..4 {
+            let mut reached = rows.clone();
+            for &(i, j) in self.places {
+                for c in (0..width).filter(|c| rows[j * width + c]) {
+                    reached[i * width + c] = true;
+                    operations += 2;
+                }
+            }
+            for (i, noise) in self.noise.iter().enumerate().filter(|_| width > n) {
+                for j in 0..i {
+                    let (a, b) = (i * width + n + j, j * width + n + i);
+                    let both = reached[a] || reached[b];
+                    (reached[a], reached[b]) = (both, both);
+                }
+                reached[i * width + n + i] |= noise.is_some();
+            }
+            operations += 4 * reached.iter().filter(|reached| **reached).count();
+            rows = reached;
+            if operations > LARGEST_STEP {
+                return None;
+            }
+        }
+        Some(self)
     }
 
     /// What the equations read, then these symbols.

@@ -71,7 +71,7 @@ impl<const L: usize> Steps<L> {
             return known;
         }
         let made = || {
-            let flow = Flow::of(&graph, equations, jacobian, &which.noisy)?;
+            let flow = Flow::of(&graph, equations, jacobian, &which.noisy).small()?;
             let (tape, has_functions) = one_step(&flow, passed)?;
             Some(Arc::new(Self {
                 noisy: which.noisy.clone(),
@@ -97,7 +97,7 @@ impl<const L: usize> Steps<L> {
             let equations = flow.system().equations();
             let graph = equations.graph();
             let jacobian = &flow.jacobians().state;
-            many_steps(&Flow::of(&graph, equations, jacobian, &self.noisy)?)
+            many_steps(&Flow::of(&graph, equations, jacobian, &self.noisy).small()?)
         };
         self.many.get_or_init(make).as_ref()
     }

@@ -76,18 +76,23 @@ impl Code {
     fn first(&self, system: &System, jacobian: &Jacobian) -> Option<Made> {
         let equations = system.equations();
         let graph = equations.graph();
-        let flow = Flow::of(&graph, equations, jacobian, &self.noisy)?;
+        let flow = Flow::of(&graph, equations, jacobian, &self.noisy).small_at_first()?;
         let n = system.states().len();
         let (h, scale) = (graph.fresh("h"), graph.fresh("scale"));
         let next = flow.step(h, &flow.start());
         let root: Vec<Term<'_>> = (0..n * n).map(|_| Some(graph.fresh("S"))).collect();
-        let carried = flow.carried(&next, scale, &root);
+        // what reflections of a lower triangle take at least
+        let carried = match 2 * n.pow(3) / 3 <= LARGEST_CARRIED {
+            true => flow.carried(&next, scale, &root),
+            false => vec![],
+        };
         let own = [Some(h), Some(scale)].into_iter();
         let inputs = flow.inputs_with(own.chain(flow.noise.iter().copied()).chain(root));
         let step = nodes(&graph, &next);
         let all = [&step[..], &nodes(&graph, &carried)].concat();
         let kinds = [(&all, LARGEST_CARRIED), (&step, LARGEST_STEP)];
-        kinds.into_iter().find_map(|(outputs, most)| {
+        let mut kinds = kinds.into_iter().skip(usize::from(carried.is_empty()));
+        kinds.find_map(|(outputs, most)| {
             Some(Made {
                 function: compiled(&graph, &inputs, outputs, most)?,
                 step: step.len(),
@@ -100,7 +105,7 @@ impl Code {
     fn later(&self, system: &System, jacobian: &Jacobian) -> Option<Function<1>> {
         let equations = system.equations();
         let graph = equations.graph();
-        let flow = Flow::of(&graph, equations, jacobian, &self.noisy)?;
+        let flow = Flow::of(&graph, equations, jacobian, &self.noisy).small()?;
         let h = graph.fresh("h");
         let z = flow.under_way(h);
         let n = system.states().len();
