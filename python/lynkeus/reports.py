@@ -39,11 +39,14 @@ __all__ = [
     "Excitation",
     "Excursion",
     "FamilyFit",
+    "FilterRow",
+    "FilterTube",
     "FitEntries",
     "FitReport",
     "FittedErrors",
     "FittedOptimum",
     "FittedValue",
+    "FollowedEntry",
     "Frozen",
     "Health",
     "HiddenBy",
@@ -673,6 +676,75 @@ class Tube(Record):
         return found
 
 
+class FilterRow(Record):
+    """A part of it."""
+
+    to: float
+    """to when"""
+    error: Named[Range]
+    """ranges of estimate minus truth"""
+    deviation: Named[Range]
+    """ranges of the filter's own standard deviations"""
+    _ITEMS: ClassVar = {"from": float}
+
+    @property
+    def since(self) -> float:
+        """The entry ``from``: from when."""
+        found: float = self["from"]
+        return found
+
+
+class FollowedEntry(Record):
+    """The error and the filter's own standard deviations along a tube."""
+
+    reached: float
+    """until when the ranges are proved"""
+    error: Named[Range]
+    """ranges of estimate minus truth over all of the time"""
+    error_end: Named[Range]
+    """the same at the end of it"""
+    deviation: Named[Range]
+    """ranges of the filter's own standard deviations over all of the time"""
+    deviation_end: Named[Range]
+    """the same at the end of it"""
+    rows: list[FilterRow]
+    """both from one time to the next"""
+
+
+class FilterTube(Record):
+    """What is proved of an extended Kalman filter from a set of starts."""
+
+    verdict: Verdict
+    """whether the error has the bounds until the time asked for"""
+    until: float
+    """until when it is asked"""
+    every: float | None
+    """the time from one sample to the next"""
+    start: Named[Range]
+    """ranges of plant states and unknown inputs at the start"""
+    estimate: Named[float]
+    """where the estimate starts"""
+    readings: Named[float]
+    """bounds of the errors of readings, by output"""
+    inputs: Named[Range]
+    """ranges of inputs that may vary as they like"""
+    noisy: FollowedEntry | None
+    """with these errors of readings"""
+    exact: FollowedEntry | None
+    """with readings that are exact: what the start alone leaves"""
+    obstacle: str | None
+    """why it is not proved"""
+    notes: list[str]
+    """what it leaves aside"""
+    _ITEMS: ClassVar = {"from": float}
+
+    @property
+    def since(self) -> float:
+        """The entry ``from``: when it starts."""
+        found: float = self["from"]
+        return found
+
+
 class ProofSummary(Record):
     """What one way of proof gives."""
 
@@ -687,8 +759,13 @@ class ProofSummary(Record):
     ultimate_bounds: Named[float | None]
     """the same for each quantity, in its unit"""
     mean_square_bound: float | None
-    """the norm below which the error ends in the root of the mean square, under noise"""
+    """the norm below which the error ends in the root of the mean square, under Gaussian noise"""
     mean_square_bounds: Named[float | None]
+    """the same for each quantity, in its unit"""
+    probable_bound: float | None
+    """the norm below which the error is in the end, at any one time with a probability of 0.99, under
+    Gaussian noise"""
+    probable_bounds: Named[float | None]
     """the same for each quantity, in its unit"""
     box: Named[Range]
     """the ranges on which it holds"""
@@ -710,8 +787,13 @@ class Proof(Record):
     ultimate_bounds: Named[float | None]
     """the same for each quantity, in its unit"""
     mean_square_bound: float | None
-    """the norm below which the error ends in the root of the mean square, under noise"""
+    """the norm below which the error ends in the root of the mean square, under Gaussian noise"""
     mean_square_bounds: Named[float | None]
+    """the same for each quantity, in its unit"""
+    probable_bound: float | None
+    """the norm below which the error is in the end, at any one time with a probability of 0.99, under
+    Gaussian noise"""
+    probable_bounds: Named[float | None]
     """the same for each quantity, in its unit"""
     box: Named[Range]
     """the ranges on which it holds"""
@@ -732,6 +814,8 @@ class Proof(Record):
     "predict"``); ``None`` where nothing is proved of sensors that are read continuously"""
     tube: Tube | None
     """whether the plant stays in the box from the starts of ``[certify]``; ``None`` where that is not asked"""
+    filter: FilterTube | None
+    """what is proved of an extended Kalman filter from these starts; null for other observers"""
     notes: list[str]
     """what you should know"""
     theorem: ProofSummary | None

@@ -8,6 +8,41 @@ use nalgebra::DMatrix;
 use crate::statement::{proved, standing, undecided};
 use crate::{Check, Reason, Statement};
 
+/// The measurement error of an output, which is a sum.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReadingError {
+    /// bound of what disturbances add
+    pub disturbed: f64,
+    /// bound of a uniform noise
+    pub uniform: f64,
+    /// standard deviation of a Gaussian noise
+    pub deviation: f64,
+}
+
+impl ReadingError {
+    /// Gaussian measurement errors are taken to stay within this many standard deviations.
+    pub const DEVIATIONS: f64 = 3.0;
+
+    /// A bound, of Gaussian noise within [`Self::DEVIATIONS`].
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        let [disturbed, uniform, deviation, times] = [
+            self.disturbed,
+            self.uniform,
+            self.deviation,
+            Self::DEVIATIONS,
+        ]
+        .map(Interval::point);
+        // no deviation is none, however many
+        let normal = if self.deviation == 0.0 {
+            Interval::ZERO
+        } else {
+            times * deviation
+        };
+        (disturbed + uniform + normal).hi()
+    }
+}
+
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
 pub struct Assumptions {
@@ -18,6 +53,8 @@ pub struct Assumptions {
     pub drift: Vec<f64>,
     /// per measured output: a bound of the measurement error, in the output's unit
     pub noise: Vec<f64>,
+    /// the same error, apart by what is known of it; empty where only its bound is
+    pub readings: Vec<ReadingError>,
     /// per augmented state: the spectral density of white noise on x'
     pub process_noise: Vec<f64>,
     /// per known input: bounds of |u'|, |u''|, …, as many as are known
@@ -42,6 +79,7 @@ impl Assumptions {
         Ok(Self {
             drift: vec![0.0; augmented.states.len()],
             noise: vec![0.0; augmented.outputs.len()],
+            readings: vec![],
             process_noise: vec![0.0; augmented.states.len()],
             input_derivatives: augmented.input_derivatives.clone(),
             within_limits: None,
@@ -117,7 +155,21 @@ impl Assumptions {
     #[must_use]
     pub fn with_noise(mut self, noise: Vec<f64>) -> Self {
         self.noise = noise;
+        self.readings = vec![];
         self
+    }
+
+    /// With measurement errors of which more is known than their bounds, one per measured output.
+    #[must_use]
+    pub fn with_readings(mut self, readings: Vec<ReadingError>) -> Self {
+        self.noise = readings.iter().map(ReadingError::bound).collect();
+        self.readings = readings;
+        self
+    }
+
+    /// Whether Gaussian noise is on a reading.
+    pub(crate) fn is_gaussian(&self) -> bool {
+        self.readings.iter().any(|error| error.deviation > 0.0)
     }
 
     /// With the ranges that the sensors can show, one per measured output. A reading is h on the box
@@ -230,6 +282,19 @@ pub struct Bounds {
     pub states: Vec<UltimateBound>,
 }
 
+impl Bounds {
+    /// The smaller of two that both hold, one by one.
+    pub(crate) fn smaller(self, other: Self) -> Self {
+        let states = self.states.into_iter().zip(other.states);
+        Self {
+            norm: self.norm.min(other.norm),
+            states: states
+                .map(|(a, b)| if a.value <= b.value { a } else { b })
+                .collect(),
+        }
+    }
+}
+
 /// A guarantee: |x̂(t) − x(t)| ≤ c·e^(−rate·t)·|x̂(0) − x(0)| + ultimate bound,
 /// while plant and estimate stay in the box.
 #[derive(Clone, Debug)]
@@ -246,9 +311,12 @@ pub struct Certificate {
     pub ultimate_bound: Option<f64>,
     /// the same per augmented state; empty where not known
     pub ultimate: Vec<UltimateBound>,
-    /// where process noise moves the plant, what √(E|x̂ − x|²) ends within: of such an error nothing
-    /// else has a bound
+    /// under Gaussian noise of the process or of readings, what √(E|x̂ − x|²) ends within: of an error that
+    /// process noise moves nothing has a bound for certain
     pub mean_square: Option<Bounds>,
+    /// under such noise, what |x̂ − x| is within in the end, at any one time with the probability
+    /// [`PROBABILITY`](lynkeus_proof::noise::PROBABILITY)
+    pub probable: Option<Bounds>,
     /// the box
     pub region: Vec<Dimension>,
     /// what has to hold, with verdicts and witnesses
@@ -286,6 +354,7 @@ impl Certificate {
             ultimate_bound: None,
             ultimate: vec![],
             mean_square: None,
+            probable: None,
             region: sides.cloned().collect(),
             hypotheses,
             constants: vec![],

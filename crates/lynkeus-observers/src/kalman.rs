@@ -14,7 +14,7 @@
 //! `particle`: particles that are drawn and weighed, for what no Gaussian holds (Gordon, Salmond and Smith, *IEE
 //! Proceedings F* 140 (1993) 107–113; Pitt and Shephard, *Journal of the American Statistical Association* 94 (1999) 590–599).
 //!
-//! Nothing is required of the plant, and nothing is proved of the error.
+//! Nothing is required of the plant, and nothing is proved of the error on a whole box.
 
 use lynkeus_model::{Home, Variable};
 use lynkeus_run::filter::{FilterKind, PATIENCE, Particles, SigmaPoints};

@@ -33,7 +33,7 @@ mod tuning;
 pub mod unknown_input;
 
 pub use block_triangular::Lee;
-pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
+pub use certificate::{Assumptions, Bounds, Certificate, Constant, ReadingError, UltimateBound};
 pub use design::{
     ChainGain, Design, DesignError, Examination, Family, ParameterValue, Shown, fit_word,
 };

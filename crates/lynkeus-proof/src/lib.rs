@@ -12,6 +12,7 @@
 //! | has every A of an interval matrix an unstable eigenvalue? | [`lyapunov`], a Schur form | [`decay::is_unstable`] |
 //! | does a chain with bounded partials decay? | [`lyapunov::of_chain`] | [`chain::Chain::decay`], [`elimination`] |
 //! | do coupled chains decay, and to where? | | [`chain::Comparison`], [`chain::ultimate`], by [`metzler`] matrices |
+//! | what does random noise leave, in mean square and in probability? | | [`noise`] |
 //! | does a filter bear a Lipschitz remainder? | Newton's method | [`riccati`] |
 //! | how large are the inverses of an interval matrix? | floating point | [`inverse`] |
 //! | are all zeros of a polynomial stable? | | [`hurwitz`]: Routh's table |
@@ -52,6 +53,7 @@ pub mod lyapunov;
 pub mod magnitude;
 pub mod matrix;
 pub mod metzler;
+pub mod noise;
 pub mod riccati;
 pub mod search;
 pub mod spectrum;

@@ -17,6 +17,7 @@ use lynkeus_experiment::{prepare, words};
 mod assumptions;
 mod bounds;
 mod excited;
+mod filter;
 mod json;
 mod print;
 mod sampled;
@@ -24,6 +25,7 @@ mod strays;
 mod tube;
 
 pub use excited::{AtTheta, Excitation, Excited};
+pub use filter::{FilterTube, Followed};
 pub(crate) use json::Proof;
 #[cfg(test)]
 pub(crate) use json::Report as CertificateReport;
@@ -62,6 +64,8 @@ pub struct CertifyReport {
     pub excited: Option<Excited>,
     /// whether the plant stays in the box, from the starts that the study asks about
     pub tube: Option<Tube>,
+    /// what is proved of an extended Kalman filter from these starts
+    pub filter: Option<FilterTube>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -176,6 +180,14 @@ impl<'a> Task<'a> {
         let of_samples = sampled.as_ref().is_some_and(|s: &Result<SampledDecay, _>| {
             s.as_ref().is_ok_and(|found| found.at.is_some())
         });
+        let filter = match self.explore {
+            true => FilterTube::of(&self.prepared, place, &self.study.observer.tuning)?,
+            false => None,
+        };
+        let of_samples = of_samples
+            || filter
+                .as_ref()
+                .is_some_and(|filter| filter.verdict == Standing::Proved);
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
             declared: account(self.prepared.declared(), in_mean_square, of_samples),
@@ -187,6 +199,7 @@ impl<'a> Task<'a> {
                 true => Tube::of(&self.prepared, place)?,
                 false => None,
             },
+            filter,
             design,
             certificate,
             notes,
@@ -385,13 +398,19 @@ impl CertifyReport {
     }
 
     /// What the root of the error's mean square ends within, by the sharper of the two ways; none without
-    /// process noise.
+    /// Gaussian noise.
     pub fn mean_square(&self) -> Option<&Bounds> {
-        let both = [Some(&self.certificate), self.theorem.as_ref()]
-            .into_iter()
-            .flatten();
-        let found = both.filter_map(|certificate| certificate.mean_square.as_ref());
-        found.min_by(|a, b| a.norm.total_cmp(&b.norm))
+        self.sharper(|certificate| certificate.mean_square.as_ref())
+    }
+
+    /// What the error is within in the end, at any one time with a probability of 0.99; none without Gaussian noise.
+    pub fn probable(&self) -> Option<&Bounds> {
+        self.sharper(|certificate| certificate.probable.as_ref())
+    }
+
+    fn sharper(&self, of: impl Fn(&Certificate) -> Option<&Bounds>) -> Option<&Bounds> {
+        let both = std::iter::once(&self.certificate).chain(&self.theorem);
+        both.filter_map(of).min_by(|a, b| a.norm.total_cmp(&b.norm))
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

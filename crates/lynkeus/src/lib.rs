@@ -81,7 +81,10 @@ mod export;
 #[cfg(test)]
 mod answers_schema;
 
-pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, Tube, Witness, certify};
+pub use certify::{
+    AtTheta, CertifyReport, Excitation, Excited, FilterTube, Followed, Strays, Tube, Witness,
+    certify,
+};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
 pub use design::{DesignReport, design};
 pub use export::export;

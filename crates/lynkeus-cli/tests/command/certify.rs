@@ -4,7 +4,9 @@ mod column;
 mod declared;
 mod errors;
 mod excited;
+mod filter;
 mod moving;
+mod noise;
 mod printed;
 mod tube;
 

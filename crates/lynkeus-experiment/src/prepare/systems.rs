@@ -25,7 +25,7 @@ pub fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
 
 /// The time between two samples of the simulation where the study says that it is sampled: its
 /// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
-pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
+pub fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
     let mut all = study.sensors.noise.iter().chain(&study.sensors.input_noise);
     let is_noisy = all.any(|(_, n)| n.size() > 0.0);
     let drawn = is_noisy.then(|| settings.row_step());
@@ -244,7 +244,7 @@ pub fn expression(plant: &Plant, expression: &Expression) -> Result<Node, Error>
 
 /// The study's expression, else the input's start value; a disturbance is zero
 /// unless it is given.
-pub(crate) fn input_expression(
+pub fn input_expression(
     study: &Study,
     plant: &Plant,
     settings: &SimulateSettings,

@@ -19,8 +19,8 @@
 //! (√V)' ≤ −rate·√V + √(wᵀPw), so in the end √V ≤ r = max √(wᵀPw)/rate, |e| ≤ r/√λ_min(P)
 //! and |e_i| ≤ r·√(P⁻¹)_ii.
 //!
-//! Process noise, white with the densities Q on x', adds tr(PQ) to (E V)'; then √(E V) settles where
-//! rate·E V = √(wᵀPw)·√(E V) + tr(PQ)/2, and √(E e_i²) obeys what |e_i| did.
+//! Process noise, white with the densities Q on x', adds tr(PQ) to (E V)'. What it and Gaussian errors of readings leave
+//! in mean square and in probability is in [`lynkeus_proof::noise`]; √(E e_i²) obeys what |e_i| did.
 
 mod correction;
 mod error_system;
@@ -39,6 +39,7 @@ use lynkeus_proof::decay::Proof;
 use lynkeus_proof::definite::is_below;
 use lynkeus_proof::magnitude::times;
 use lynkeus_proof::matrix::sum;
+use lynkeus_proof::noise::{Noise, largest};
 use lynkeus_proof::{decay, spectrum};
 use lynkeus_structure::{AugmentedPlant, Standing};
 use nalgebra::DMatrix;
@@ -46,7 +47,9 @@ pub use said::{Inequality, Obstacle, Said};
 pub use sampled::{AtSamples, SampledDecay, between_samples};
 
 use crate::statement::{proved, undecided};
-use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Observer, Reason};
+use crate::{
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Observer, ReadingError, Reason,
+};
 use error_system::ErrorSystem;
 use refute::Sample;
 
@@ -155,9 +158,10 @@ fn certified(
     match found {
         Some(proof) => {
             fill(&mut certificate, augmented, &system, &proof, assumptions);
-            if assumptions.is_moved() && certificate.verdict() == Standing::Proved {
-                certificate.mean_square =
-                    mean_square(augmented, &system, &proof, assumptions, &search);
+            let is_random = assumptions.is_moved() || assumptions.is_gaussian();
+            if is_random && certificate.verdict() == Standing::Proved {
+                let random = random(augmented, &system, &proof, assumptions, &search);
+                (certificate.mean_square, certificate.probable) = random;
             }
             let faster = |spent| Said::FasterSought(spent).into();
             certificate.notes.extend(spent.map(faster));
@@ -221,7 +225,7 @@ fn fill(
             "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
         ));
     }
-    match bounds(augmented, system, proof, assumptions, Interval::ZERO) {
+    match bounds(augmented, system, proof, assumptions) {
         Some(bounds) => {
             certificate.ultimate_bound = Some(bounds.norm);
             certificate.ultimate = bounds.states;
@@ -240,65 +244,122 @@ const TRIES: usize = 40;
 /// Slower rates whose P may leave a smaller mean square, as shares of the fastest.
 const SLOWER: [f64; 3] = [0.85, 0.6, 0.35];
 
-/// What the root of its mean square ends within with process noise, by the P of the proof and those of
-/// slower rates: each of the bounds holds.
-fn mean_square(
+/// What random noise leaves in mean square, and in probability, by the P of the proof and those of slower rates:
+/// each of the bounds holds.
+fn random(
     augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
     budget: &Budget,
-) -> Option<Bounds> {
+) -> (Option<Bounds>, Option<Bounds>) {
     let slower = SLOWER.iter().filter_map(|share| {
         decay::prove(&system.models, &system.scale, share * proof.rate, budget)
     });
-    let each = std::iter::once(proof.clone()).chain(slower);
-    let each = each.filter_map(|proof| {
-        let densities = assumptions.process_noise.iter().enumerate();
-        let trace =
-            sum(densities.map(|(i, q)| Interval::point(proof.P[(i, i)]) * Interval::point(*q)));
-        bounds(augmented, system, &proof, assumptions, trace)
-    });
-    each.reduce(|a, b| Bounds {
-        norm: a.norm.min(b.norm),
-        states: a
-            .states
-            .into_iter()
-            .zip(b.states)
-            .map(|(a, b)| if a.value <= b.value { a } else { b })
-            .collect(),
+    let each: Vec<Proof> = std::iter::once(proof.clone()).chain(slower).collect();
+    let best = |r: &dyn Fn(&Noise) -> Interval| {
+        let each = each.iter().filter_map(|proof| {
+            let noise = noise(system, proof, assumptions)?;
+            finite_bounds(augmented, &proof.P, r(&noise))
+        });
+        each.reduce(|a, b| a.smaller(b))
+    };
+    (best(&Noise::in_mean_square), best(&Noise::in_probability))
+}
+
+/// How eᵀPe moves under noise; none where an assumed size is infinite.
+fn noise(system: &ErrorSystem, proof: &Proof, assumptions: &Assumptions) -> Option<Noise> {
+    let P = &proof.P;
+    let bounded = |e: &ReadingError| Interval::point(e.disturbed) + Interval::point(e.uniform);
+    let usual = |e: &ReadingError| {
+        let uniform = Interval::point(e.uniform) / Interval::point(3.0).sqrt();
+        Interval::point(e.disturbed) + uniform
+    };
+    let certain = push(system, P, assumptions, &bounded)?;
+    let usual = push(system, P, assumptions, &usual)?;
+    let column = |(j, error): (usize, &ReadingError)| match error.deviation > 0.0 {
+        true => weighed(P, &column(system, j)).map(|c| c * Interval::point(error.deviation)),
+        false => Some(Interval::ZERO),
+    };
+    let normal: Option<Vec<Interval>> = assumptions
+        .readings
+        .iter()
+        .enumerate()
+        .map(column)
+        .collect();
+    let densities = &assumptions.process_noise;
+    let diagonal = |(i, q): (usize, &f64)| Interval::point(P[(i, i)]) * Interval::point(*q);
+    Some(Noise {
+        rate: proof.rate,
+        certain,
+        usual,
+        normal: sum(normal?.into_iter()),
+        trace: sum(densities.iter().enumerate().map(diagonal)),
+        largest: largest(P, densities)?,
     })
 }
 
-/// What the root of the error's mean square ends within where process noise adds `trace` to (E V)', the error
-/// itself where it adds nothing; none where an assumed size is infinite.
+/// Sizes of what the error of an output adds to e'.
+fn column(system: &ErrorSystem, output: usize) -> Vec<Interval> {
+    let rows = system.injection.iter();
+    rows.map(|row| Interval::point(row[output])).collect()
+}
+
+/// What √(E|x̂ − x|²) ends within where nothing of a reading's error is known but its bound, or what the
+/// error itself does: √(wᵀPw)/rate.
 fn bounds(
     augmented: &AugmentedPlant<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
-    trace: Interval,
 ) -> Option<Bounds> {
-    let n = augmented.states.len();
+    let bound = |e: &ReadingError| Interval::point(e.bound());
+    let push = push(system, &proof.P, assumptions, &bound)?;
+    finite_bounds(
+        augmented,
+        &proof.P,
+        settled(proof.rate, push, Interval::ZERO),
+    )
+}
+
+/// √(wᵀPw) at most, for drift and errors of readings of such sizes; where nothing but a bound is known of the
+/// errors, of this size. None where a size is infinite.
+fn push(
+    system: &ErrorSystem,
+    P: &DMatrix<f64>,
+    assumptions: &Assumptions,
+    size: &dyn Fn(&ReadingError) -> Interval,
+) -> Option<Interval> {
+    let sizes: Vec<Interval> = match assumptions.readings.is_empty() {
+        true => assumptions
+            .noise
+            .iter()
+            .map(|ν| Interval::point(*ν))
+            .collect(),
+        false => assumptions.readings.iter().map(size).collect(),
+    };
     let through = |i: usize| {
-        let columns = system.injection[i].iter().zip(&assumptions.noise);
-        sum(columns.map(|(e, ν)| match times(*e, *ν) == 0.0 {
+        let columns = system.injection[i].iter().zip(&sizes);
+        sum(columns.map(|(e, ν)| match times(*e, ν.hi()) == 0.0 {
             true => Interval::ZERO,
-            false => Interval::point(*e) * Interval::point(*ν),
+            false => Interval::point(*e) * *ν,
         }))
     };
     let drift = |i: usize| assumptions.drift.get(i).copied().unwrap_or(0.0);
-    let w: Vec<Interval> = (0..n)
+    let w: Vec<Interval> = (0..P.nrows())
         .map(|i| Interval::point(drift(i)) + through(i))
         .collect();
-    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
-    for w in &w {
-        finite(w.hi())?;
+    weighed(P, &w)
+}
+
+/// √(wᵀPw) at most for vectors of such sizes; none where one is infinite.
+fn weighed(P: &DMatrix<f64>, w: &[Interval]) -> Option<Interval> {
+    let n = w.len();
+    if !w.iter().all(|w| w.hi().is_finite()) {
+        return None;
     }
     let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    let square = sum(pairs.map(|(i, j)| Interval::point(proof.P[(i, j)]).abs() * w[i] * w[j]));
-    let r = settled(proof.rate, square.sqrt(), trace);
-    finite_bounds(augmented, &proof.P, r)
+    Some(sum(pairs.map(|(i, j)| Interval::point(P[(i, j)]).abs() * w[i] * w[j])).sqrt())
 }
 
 /// Bounds of e where √(eᵀPe) ≤ r; none where they are infinite.

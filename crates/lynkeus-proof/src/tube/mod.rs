@@ -17,11 +17,12 @@
 //!
 //! Between steps the set is p₀(s) + G ξ, a polynomial and a zonotope, ξ ∈ [−1, 1]ᵐ. A step takes
 //! d ∘ q for Gξ, with d the sums of G's rows; what comes back linear in q is multiplied to G, all
-//! else becomes new columns (`zonotope.rs`).
+//! else becomes new columns (`zonotope.rs`). [`Sampled`] jumps between flows.
 
 mod algebra;
 mod model;
 mod ring;
+mod sampled;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -31,6 +32,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::{Budget, Spent};
 
+pub use sampled::{Sampled, See};
 use step::Stepper;
 pub use step::{Problem, Segment};
 

@@ -99,6 +99,11 @@ impl Ring {
         self.start
     }
 
+    /// Number of symbols of the remainder.
+    pub fn remainders(&self) -> usize {
+        self.monomials[0].len() - self.start
+    }
+
     /// The highest weight.
     pub fn order(&self) -> usize {
         self.order

@@ -92,11 +92,16 @@ struct Proved {
 }
 
 impl<'p> Stepper<'p> {
+    /// From the start set.
     pub fn new(problem: &'p Problem, until: f64) -> Self {
-        let n = problem.start.len();
+        Self::with(problem, until, problem.start.len())
+    }
+
+    /// The same with so many symbols of remainders.
+    fn with(problem: &'p Problem, until: f64, remainders: usize) -> Self {
         let is_wide = |range: &&Interval| !range.is_point();
         let all = problem.start.iter().chain(&problem.constants);
-        let ring = Rc::new(Ring::new(all.filter(is_wide).count(), n));
+        let ring = Rc::new(Ring::new(all.filter(is_wide).count(), remainders));
         let mut symbol = 0;
         let mut along = |range: &Interval| {
             if range.is_point() {
@@ -113,15 +118,69 @@ impl<'p> Stepper<'p> {
             constants,
             inputs: inputs.map(|&range| Model::within(&ring, range)).collect(),
             until,
-            scale: vec![0.0; n],
+            scale: vec![0.0; problem.start.len()],
             set: Set {
                 time: problem.from,
+                zonotope: Zonotope::origin(polynomial.len()),
                 polynomial,
-                zonotope: Zonotope::origin(n),
                 step: (until - problem.from) / 64.0,
             },
             ring,
         }
+    }
+
+    /// From what `first` makes of the start set, with symbols for so many errors of a sample.
+    pub fn lifted(flow: &'p Problem, first: &Tape, errors: usize, until: f64) -> Option<Self> {
+        let n = first.outputs();
+        let mut stepper = Self::with(flow, until, n + errors);
+        stepper.scale = vec![0.0; n];
+        let seeds = &stepper.set.polynomial;
+        let models = first.eval_in(&stepper.samples(), seeds);
+        let (zonotope, reach) = (Zonotope::origin(n), vec![0.0; n]);
+        stepper.set = stepper
+            .set
+            .next(&stepper.ring, known(models)?, &zonotope, &reach);
+        Some(stepper)
+    }
+
+    /// The algebra of a sample, which takes no time.
+    fn samples(&self) -> Models<'_> {
+        Models {
+            ring: &self.ring,
+            degree: 0,
+        }
+    }
+
+    /// Until when to go on.
+    pub fn aim(&mut self, until: f64) {
+        self.until = until;
+    }
+
+    /// Where the states are.
+    pub fn ranges(&self) -> Vec<Interval> {
+        let reach = self.set.zonotope.reach();
+        let start = self.start(&reach).unwrap_or_default();
+        start.iter().map(|x| x.range(&self.ring)).collect()
+    }
+
+    /// Jumps to what `map` makes of the states, the time, and errors of at most these sizes; the ranges then,
+    /// none where they have no bounds.
+    pub fn jump(&mut self, map: &Tape, errors: &[f64]) -> Option<Vec<Interval>> {
+        let reach = self.set.zonotope.reach();
+        let start = self.start(&reach)?;
+        let error = |(j, size): (usize, &f64)| {
+            let range = Interval::new(-size, *size).ok()?;
+            let symbol = self.ring.start() + start.len() + j;
+            Some(Model::along(&self.ring, range, symbol))
+        };
+        let errors: Option<Vec<Model>> = errors.iter().enumerate().map(error).collect();
+        let time = Model::constant(&self.ring, self.set.time);
+        let arguments: Vec<Model> = start.into_iter().chain([time]).chain(errors?).collect();
+        let models = known(map.eval_in(&self.samples(), &arguments))?;
+        let ranges = models.iter().map(|x| x.range(&self.ring)).collect();
+        let zonotope = self.set.zonotope.clone();
+        self.set = self.set.next(&self.ring, models, &zonotope, &reach);
+        Some(ranges)
     }
 
     /// Where the tube has come to.
@@ -177,7 +236,7 @@ impl<'p> Stepper<'p> {
                 last,
                 reach,
                 zonotope: self.set.zonotope.clone(),
-                next: step * longer.min(slower),
+                next: step.min(4.0 * left) * longer.min(slower),
             });
         }
         None
@@ -186,10 +245,9 @@ impl<'p> Stepper<'p> {
     /// x₀ = p₀(s) + d ∘ q
     fn start(&self, reach: &[f64]) -> Option<Vec<Model>> {
         let n = reach.len();
-        let symbols = self.ring.exponents(0).len();
         let state = |j: usize| {
             let mut model = self.set.polynomial[j].clone();
-            let place = self.ring.symbol(symbols - n + j)?;
+            let place = self.ring.symbol(self.ring.start() + j)?;
             model.coefficients[place] = reach[j];
             (reach[j].is_finite() && model.rest.is_finite()).then_some(model)
         };
@@ -359,33 +417,54 @@ impl Segment {
             .collect()
     }
 
-    /// The set where it ends: what is linear in the symbols of the remainder goes through the
-    /// zonotope, what is mixed becomes a box.
+    /// The set where it ends.
     pub(super) fn into_end(self) -> Set {
-        let n = self.last.len();
+        let set = Set {
+            time: self.to,
+            polynomial: vec![],
+            zonotope: Zonotope::origin(0),
+            step: self.next,
+        };
+        set.next(&self.ring, self.last, &self.zonotope, &self.reach)
+    }
+}
+
+impl Set {
+    /// The set of such models at this time: what is linear in the symbols of the remainder goes through the
+    /// zonotope that these stood for, what is linear in those of errors beside it; what is mixed becomes a box.
+    fn next(&self, ring: &Ring, models: Vec<Model>, zonotope: &Zonotope, reach: &[f64]) -> Self {
+        let n = models.len();
         let mut polynomial = vec![];
         let (mut L, mut around) = (vec![vec![0.0; n]; n], vec![0.0; n]);
-        for (k, mut model) in self.last.into_iter().enumerate() {
+        let mut errors = vec![vec![0.0; n]; ring.remainders().saturating_sub(n)];
+        for (k, mut model) in models.into_iter().enumerate() {
             let mut mixed = 0.0;
             for (i, c) in model.coefficients.iter_mut().enumerate() {
-                match self.ring.part(i) {
+                match ring.part(i) {
                     Part::Start => continue,
-                    Part::Remainder(j) => L[k][j] = *c,
+                    Part::Remainder(j) if j < n => L[k][j] = *c,
+                    Part::Remainder(j) => errors[j - n][k] = *c,
                     Part::Mixed => mixed += c.abs(),
                 }
                 *c = 0.0;
             }
-            around[k] = raised(raised(mixed, self.ring.len()) + model.rest, 2);
+            around[k] = raised(raised(mixed, ring.len()) + model.rest, 2);
             model.rest = 0.0;
             polynomial.push(model);
         }
-        Set {
-            time: self.to,
+        Self {
+            time: self.time,
             polynomial,
-            zonotope: self.zonotope.through(&L, &self.reach, &around),
-            step: self.next,
+            zonotope: zonotope.through(&L, reach, &around).beside(errors),
+            step: self.step,
         }
     }
+}
+
+/// None where a value has no bounds.
+fn known(models: Vec<Model>) -> Option<Vec<Model>> {
+    let is_known = |x: &Model| x.rest.is_finite() && x.norm().is_finite();
+    models.iter().all(is_known).then_some(models)
 }
 
 #[cfg(test)]

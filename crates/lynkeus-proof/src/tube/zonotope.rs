@@ -68,6 +68,13 @@ impl Zonotope {
         }));
         Self { columns, rows: n }
     }
+
+    /// With more columns; the next image joins what are too many.
+    pub fn beside(mut self, columns: Vec<Vec<f64>>) -> Self {
+        let is_there = |column: &Vec<f64>| column.iter().any(|x| *x != 0.0);
+        self.columns.extend(columns.into_iter().filter(is_there));
+        self
+    }
 }
 
 /// Sums of sizes along the rows, rounded up.

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Graph, Interval, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
-use lynkeus_observers::Assumptions;
+use lynkeus_observers::{Assumptions, ReadingError};
 use lynkeus_structure::{AugmentedPlant, Dimension, Matrix, Region, range};
 
 use crate::Error;
@@ -11,9 +11,6 @@ use lynkeus_experiment::prepare::declared::Declared;
 use lynkeus_experiment::words::explain;
 use lynkeus_study::Noise;
 
-/// Gaussian measurement errors are taken to stay within this many standard deviations.
-const DEVIATIONS: f64 = 3.0;
-
 /// What the guarantee takes for granted: all that the study declares, on the box of `augmented`.
 pub(super) fn of(
     prepared: &Prepared<'_>,
@@ -21,7 +18,7 @@ pub(super) fn of(
 ) -> Result<Assumptions, Error> {
     let (declared, plant, region) = (prepared.declared(), augmented.plant, augmented.region());
     let drift = drift(declared, plant, augmented, &region)?;
-    let noise = noise(declared, plant, augmented, &region)?;
+    let readings = errors(declared, plant, augmented, &region)?;
     let assumptions = Assumptions::new(augmented, region).map_err(explain)?;
     let shown = |name: &str| {
         let limits = declared.limits.of(name)?;
@@ -48,11 +45,21 @@ pub(super) fn of(
     };
     assumptions
         .with_drift(drift)
-        .with_noise(noise)
+        .with_readings(readings)
         .with_process_noise(augmented.states.iter().map(density).collect())
         .with_input_derivatives(augmented.inputs.iter().map(derivatives).collect())
         .with_limits(augmented, &limits)
         .map_err(explain)
+}
+
+/// Bounds of the errors of readings, one per measured output.
+pub(super) fn readings(
+    prepared: &Prepared<'_>,
+    augmented: &AugmentedPlant<'_>,
+) -> Result<Vec<f64>, Error> {
+    let region = augmented.region();
+    let errors = errors(prepared.declared(), augmented.plant, augmented, &region)?;
+    Ok(errors.iter().map(ReadingError::bound).collect())
 }
 
 /// Per augmented state: what disturbances within their declared ranges add to its
@@ -131,33 +138,35 @@ fn largest_difference(
 }
 
 /// Per measured output: how far what is measured may be from h(x, u) without disturbances.
-/// That is what these add to h, and the bound of a uniform noise or three standard
-/// deviations of a Gaussian one, of which a relative one counts from the disturbed value.
-fn noise(
+/// That is what these add to h, and the noise, of which a relative one counts from the disturbed value.
+fn errors(
     declared: &Declared,
     plant: &Plant,
     augmented: &AugmentedPlant<'_>,
     region: &Region,
-) -> Result<Vec<f64>, Error> {
+) -> Result<Vec<ReadingError>, Error> {
     let graph = &plant.graph;
     let wider = disturbed(declared, plant, region);
     let of = |output: &Variable| {
         let own = plant.outputs.iter().find(|o| o.name == output.name);
         let actual = own.map_or(output.node, |o| o.node);
-        let added = largest_difference(plant, actual, output.node, &wider)?;
+        let disturbed = largest_difference(plant, actual, output.node, &wider)?;
         let given = declared.noise.of(&output.name).copied();
-        let deviations = Interval::point(DEVIATIONS);
         // a share of nothing is nothing, of an unbounded output too
-        let error = match given.filter(|noise| noise.size() > 0.0) {
-            None => Interval::ZERO,
-            Some(Noise::Absolute(deviation)) => deviations * Interval::point(deviation),
-            Some(Noise::Uniform(bound)) => Interval::point(bound),
+        let (uniform, deviation) = match given.filter(|noise| noise.size() > 0.0) {
+            None => (0.0, 0.0),
+            Some(Noise::Absolute(deviation)) => (0.0, deviation),
+            Some(Noise::Uniform(bound)) => (bound, 0.0),
             Some(Noise::Relative(share)) => {
                 let size = Interval::point(magnitude(graph, actual, &wider)?);
-                deviations * Interval::point(share) * size
+                (0.0, (Interval::point(share) * size).hi())
             }
         };
-        Ok((error + Interval::point(added)).hi())
+        Ok(ReadingError {
+            disturbed,
+            uniform,
+            deviation,
+        })
     };
     augmented.outputs.iter().map(|o| of(&o.variable)).collect()
 }
@@ -180,7 +189,8 @@ pub(super) fn notes(prepared: &Prepared<'_>, augmented: &AugmentedPlant<'_>) -> 
     let outputs = augmented.outputs.iter().map(|o| &o.variable);
     let said = [
         names(outputs.filter(|v| is_gaussian(v)).collect()).map(|names| format!(
-            "the noise of {names} is Gaussian: its readings are taken to lie within {DEVIATIONS} standard deviations, as 99.7 % of them do"
+            "the noise of {names} is Gaussian: its readings are taken to lie within {} standard deviations, as 99.7 % of them do",
+            ReadingError::DEVIATIONS
         )),
         names(disturbances(declared, augmented.plant).filter(|d| is_open(d)).collect()).map(|names| format!(
             "no bound covers what {names} does to the error: it decays at the rate only up to what that leaves; declare min and max"

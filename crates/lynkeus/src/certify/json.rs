@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::excited::ExcitationEntry;
+use super::filter::told::FilterEntry;
 use super::sampled::SampledEntry;
 use super::tube::told::TubeEntry;
 use super::{CertifyReport, Excited, Strays, bounds};
@@ -55,6 +56,8 @@ pub(crate) struct Proof<'a> {
     sampled: Option<SampledEntry>,
     /// whether the plant stays in the box from the starts of `[certify]`; null where that is not asked
     tube: Option<TubeEntry>,
+    /// what is proved of an extended Kalman filter from these starts; null for other observers
+    filter: Option<FilterEntry>,
     /// what you should know
     notes: Vec<String>,
     /// what the family's theorem gives, where it was asked
@@ -76,10 +79,14 @@ struct ProofSummary {
     ultimate_bound: Option<f64>,
     /// the same for each quantity, in its unit
     ultimate_bounds: Named<Option<f64>>,
-    /// the norm below which the error ends in the root of the mean square, under noise
+    /// the norm below which the error ends in the root of the mean square, under Gaussian noise
     mean_square_bound: Option<f64>,
     /// the same for each quantity, in its unit
     mean_square_bounds: Named<Option<f64>>,
+    /// the norm below which the error is in the end, at any one time with a probability of 0.99, under Gaussian noise
+    probable_bound: Option<f64>,
+    /// the same for each quantity, in its unit
+    probable_bounds: Named<Option<f64>>,
     /// the ranges on which it holds
     #[serde(rename = "box")]
     region: Named<Range>,
@@ -130,6 +137,7 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
             sampling: report.sampling.as_ref().map(|found| found.entry(true)),
             sampled: report.sampled.as_ref().map(SampledEntry::from),
             tube: report.tube.as_ref().map(TubeEntry::from),
+            filter: report.filter.as_ref().map(FilterEntry::from),
             notes: both
                 .flat_map(|certificate| report.notes_of(certificate))
                 .chain(report.assumed.iter().cloned())
@@ -143,11 +151,12 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
 /// The better of the two ways, with the verdict of both.
 fn summary(report: &CertifyReport) -> ProofSummary {
     let mut best = report.best().clone();
-    best.mean_square = None;
+    (best.mean_square, best.probable) = (None, None);
     if report.is_contradiction() {
         (best.rate, best.ultimate_bound, best.ultimate) = (None, None, vec![]);
     } else {
         best.mean_square = report.mean_square().cloned();
+        best.probable = report.probable().cloned();
     }
     ProofSummary {
         verdict: report.verdict().into(),
@@ -158,6 +167,7 @@ fn summary(report: &CertifyReport) -> ProofSummary {
 impl From<&Certificate> for ProofSummary {
     fn from(certificate: &Certificate) -> Self {
         let mean_square = certificate.mean_square.as_ref();
+        let probable = certificate.probable.as_ref();
         let constants = certificate.constants.iter().map(|c| ConstantEntry {
             name: c.name.clone(),
             value: finite(c.value),
@@ -171,6 +181,8 @@ impl From<&Certificate> for ProofSummary {
             ultimate_bounds: bounds::by_name(&certificate.ultimate),
             mean_square_bound: mean_square.map(|b| b.norm),
             mean_square_bounds: bounds::by_name(mean_square.map_or(&[], |b| &b.states)),
+            probable_bound: probable.map(|b| b.norm),
+            probable_bounds: bounds::by_name(probable.map_or(&[], |b| &b.states)),
             region: sides(&certificate.region),
             constants: constants.collect(),
         }

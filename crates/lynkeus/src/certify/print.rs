@@ -3,6 +3,7 @@
 use lynkeus_answer::Document;
 use lynkeus_answer::document::{Cell, Line, Table};
 use lynkeus_observers::Certificate;
+use lynkeus_proof::noise::PROBABILITY;
 use lynkeus_structure::Standing;
 use lynkeus_words::Words;
 use serde_json::Value;
@@ -62,6 +63,9 @@ impl Answer for CertifyReport {
         if let Some(tube) = &self.tube {
             tube.tell(&mut document);
         }
+        if let Some(filter) = &self.filter {
+            filter.tell(&mut document);
+        }
         if let Some(excited) = &self.excited {
             excited.tell(&mut document);
         }
@@ -109,7 +113,10 @@ fn conclusion(report: &CertifyReport) -> Line {
             Line::verdict("refuted").and(": an error grows, however small it is")
         }
         (Standing::Undecided, _) => {
-            Line::verdict("undecided").and(": neither a proof nor a counterexample")
+            let filter = report.filter.as_ref();
+            let filter = filter.map_or(String::new(), |found| format!("; {}", found.clause()));
+            Line::verdict("undecided")
+                .and(format!(": neither a proof nor a counterexample{filter}"))
         }
     }
 }
@@ -208,6 +215,12 @@ fn certificate(document: &mut Document, report: &CertifyReport, certificate: &Ce
     if let Some(found) = &certificate.mean_square {
         let bounds = bounds::in_words(report, &found.states).join(", ");
         document.item(format!("{IN_MEAN_SQUARE}: {bounds}"));
+    }
+    if let Some(found) = &certificate.probable {
+        let bounds = bounds::in_words(report, &found.states).join(", ");
+        document.item(format!(
+            "in the end, at any one time with a probability of {PROBABILITY}, within: {bounds}"
+        ));
     }
     document.notes(report.notes_of(certificate));
 }

@@ -16,7 +16,7 @@ use lynkeus_experiment::prepare::Prepared;
 use lynkeus_experiment::prepare::systems::starts;
 use lynkeus_experiment::words::{explain, number};
 pub use seen::Row;
-use seen::{Seen, outward};
+pub(super) use seen::{Seen, outward};
 
 mod seen;
 pub(crate) mod told;
@@ -31,7 +31,7 @@ const HALVINGS: usize = 8;
 const CORNERS: usize = 16;
 
 /// Where quantities are, by their names.
-type Ranges = Vec<(String, Interval)>;
+pub type Ranges = Vec<(String, Interval)>;
 
 /// What is proved of the plant's way from a set of starts.
 #[derive(Clone, Debug)]
@@ -158,18 +158,8 @@ impl Question {
         place: &AugmentedPlant<'_>,
         start: &[(Name, f64, f64)],
     ) -> Result<Self, Error> {
-        let (study, plant) = (prepared.study(), prepared.plant());
-        let run = study.simulate.as_ref();
-        let from = run.map_or(0.0, |run| run.start);
-        let until = study.certify.until.or(run.map(|run| run.until));
-        let until = until.filter(|until| *until > from && until.is_finite());
-        let until = until.ok_or_else(|| {
-            let message = format!(
-                "`start` of [certify] needs `until`: a time after {}",
-                number(from)
-            );
-            Error::input(message).at(&study.file)
-        })?;
+        let plant = prepared.plant();
+        let (from, until) = until(prepared)?;
         let slew = &prepared.declared().slew;
         let (states, unknown) = place.states.split_at(place.plant_states());
         let (wandering, constants): (Vec<Variable>, Vec<Variable>) = unknown
@@ -194,7 +184,7 @@ impl Question {
             .filter_map(|(name, low, high)| Some((name.clone(), Interval::new(*low, *high).ok()?)))
             .collect();
         refuse_others(&given, &plant.name, states.iter().chain(&constants))?;
-        let usual = starts(plant, run.map_or(&[], |run| &run.initial))?;
+        let usual = first_of(prepared)?;
         let first = |(state, usual): (&Variable, f64)| {
             let own = Name::best(&given, &state.name).copied();
             own.unwrap_or(Interval::point(usual))
@@ -283,7 +273,8 @@ impl Question {
 
     /// Goes along a tube to its end, or only as far as it is inside the box; where it is not is an obstacle.
     fn followed(&self, problem: &Problem, inside: bool, budget: &Budget) -> Followed {
-        let mut seen = Seen::new(problem, self.until);
+        let mut seen = Seen::new(problem.from, self.until);
+        seen.end.clone_from(&problem.start);
         let outside = |time: f64, ranges: &[Interval]| {
             let i = self.outside(ranges)?;
             Some(self.beyond(i, time, ranges[i]))
@@ -455,7 +446,10 @@ impl Question {
 }
 
 /// The ranges of inputs: of one that has no bounds of its own, those of the simulation.
-fn bounded(prepared: &Prepared<'_>, inputs: &[Variable]) -> Result<Vec<Interval>, Error> {
+pub(super) fn bounded(
+    prepared: &Prepared<'_>,
+    inputs: &[Variable],
+) -> Result<Vec<Interval>, Error> {
     let simulated = prepared.simulated_inputs()?;
     let range = |input: &Variable| {
         let mut run = simulated.iter().filter(|(name, ..)| *name == input.name);
@@ -468,8 +462,34 @@ fn bounded(prepared: &Prepared<'_>, inputs: &[Variable]) -> Result<Vec<Interval>
     Ok(inputs.iter().map(range).collect())
 }
 
+/// From when until when the study asks.
+///
+/// # Errors
+/// No `until`, or one before the start.
+pub(super) fn until(prepared: &Prepared<'_>) -> Result<(f64, f64), Error> {
+    let study = prepared.study();
+    let run = study.simulate.as_ref();
+    let from = run.map_or(0.0, |run| run.start);
+    let until = study.certify.until.or(run.map(|run| run.until));
+    let until = until.filter(|until| *until > from && until.is_finite());
+    let until = until.ok_or_else(|| {
+        let message = format!(
+            "`start` of [certify] needs `until`: a time after {}",
+            number(from)
+        );
+        Error::input(message).at(&study.file)
+    })?;
+    Ok((from, until))
+}
+
+/// Where the plant starts where nothing else is said.
+pub(super) fn first_of(prepared: &Prepared<'_>) -> Result<Vec<f64>, Error> {
+    let run = prepared.study().simulate.as_ref();
+    starts(prepared.plant(), run.map_or(&[], |run| &run.initial))
+}
+
 /// Its side of the box.
-fn side(variable: &Variable) -> Interval {
+pub(super) fn side(variable: &Variable) -> Interval {
     Interval::new(variable.min, variable.max).unwrap_or(Interval::ENTIRE)
 }
 
@@ -492,7 +512,7 @@ fn right(
 }
 
 /// Every name has to be a state or an unknown input that is constant.
-fn refuse_others<'v>(
+pub(super) fn refuse_others<'v>(
     given: &[(Name, Interval)],
     plant: &str,
     variables: impl Iterator<Item = &'v Variable> + Clone,

@@ -140,7 +140,7 @@ fn off_line(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
 /// Spectral densities, one per estimated quantity: the study's `[process_noise]`; for an
 /// unknown input without one, a wander over a quarter of its range in a tenth of the log. Where the
 /// study declares none at all every state may drift a little.
-pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
+pub fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
     let (study, augmented) = (prepared.study(), prepared.augmented());
     let declared = &prepared.declared().process_noise;
     // who says how wrong the readings of inputs are has said what moves the plant otherwise

@@ -1,7 +1,6 @@
 //! A tube over equal parts of the time.
 
 use lynkeus_expr::Interval;
-use lynkeus_proof::tube::Problem;
 
 use lynkeus_experiment::words::number;
 
@@ -9,7 +8,7 @@ use lynkeus_experiment::words::number;
 const ROWS: usize = 200;
 
 /// Where the states are, in equal parts of the time.
-pub(super) struct Seen {
+pub(crate) struct Seen {
     pub rows: Vec<Row>,
     /// until when
     pub reached: f64,
@@ -21,15 +20,15 @@ pub(super) struct Seen {
 pub type Row = (f64, f64, Vec<Interval>);
 
 impl Seen {
-    pub fn new(problem: &Problem, until: f64) -> Self {
+    pub fn new(from: f64, until: f64) -> Self {
         let time = |k: usize| match k {
             ROWS => until,
-            _ => problem.from + (until - problem.from) * k as f64 / ROWS as f64,
+            _ => from + (until - from) * k as f64 / ROWS as f64,
         };
         Self {
             rows: (0..ROWS).map(|k| (time(k), time(k + 1), vec![])).collect(),
-            reached: problem.from,
-            end: problem.start.clone(),
+            reached: from,
+            end: vec![],
         }
     }
 
@@ -83,7 +82,7 @@ fn join(all: &mut Vec<Interval>, ranges: &[Interval]) {
 }
 
 /// Four significant digits that hold all of the range.
-pub(super) fn outward(range: Interval) -> String {
+pub(crate) fn outward(range: Interval) -> String {
     let digits = |x: f64, up: bool| {
         if x == 0.0 || !x.is_finite() {
             return number(x);

@@ -11,7 +11,7 @@ use super::{Row, Tube, Witness};
 use lynkeus_experiment::entries::{Named, Range, Verdict, finite};
 use lynkeus_experiment::words::number;
 
-fn listed(ranges: &[(String, Interval)]) -> String {
+pub(crate) fn listed(ranges: &[(String, Interval)]) -> String {
     let range = |(name, range): &(String, Interval)| match range.is_point() {
         true => format!("{name} = {}", number(range.lo())),
         false => format!("{name} in {}", outward(*range)),
@@ -128,11 +128,11 @@ struct TubeRow {
     range: Named<Range>,
 }
 
-fn ends(range: Interval) -> Range {
+pub(crate) fn ends(range: Interval) -> Range {
     [range.lo(), range.hi()].map(finite)
 }
 
-fn entries(ranges: &[(String, Interval)]) -> Named<Range> {
+pub(crate) fn entries(ranges: &[(String, Interval)]) -> Named<Range> {
     ranges
         .iter()
         .map(|(name, range)| (name.clone(), ends(*range)))
