@@ -14,7 +14,7 @@ const RANDOM: usize = 10;
 /// Locked as long as its run lives.
 const LOCK: &str = "lock";
 
-/// A folder without a lock that is as old as this was left before it had one.
+/// A folder may be younger than this without a lock: its run is about to take it.
 const YOUNG: Duration = Duration::from_secs(60);
 
 /// Removed with its value; and by the next run, if this one is killed.
@@ -66,18 +66,19 @@ fn is_ours(name: &str) -> bool {
 
 /// Whether nobody works in a folder any more.
 fn is_left(folder: &Path) -> bool {
-    match File::open(folder.join(LOCK)) {
-        Ok(lock) => lock.try_lock().is_ok(),
-        Err(_) => {
-            let changed = folder.metadata().and_then(|data| data.modified());
-            let age = changed.ok().and_then(|changed| changed.elapsed().ok());
-            age.is_some_and(|age| age > YOUNG)
-        }
-    }
+    let lock = File::open(folder.join(LOCK)).ok();
+    let data = lock
+        .as_ref()
+        .map_or_else(|| folder.metadata(), File::metadata);
+    let made = data.and_then(|data| data.modified()).ok();
+    let age = made.and_then(|made| made.elapsed().ok());
+    age.is_some_and(|age| age > YOUNG) && lock.is_none_or(|lock| lock.try_lock().is_ok())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::SystemTime;
+
     use super::*;
 
     #[test]
@@ -89,15 +90,24 @@ mod tests {
             std::fs::write(folder.join("a.c"), "int a;").unwrap();
             folder
         };
+        let before = SystemTime::now() - 2 * YOUNG;
+        let locked = |folder: &Path, made: SystemTime| {
+            let lock = File::create(folder.join(LOCK)).unwrap();
+            lock.set_modified(made).unwrap();
+            lock
+        };
         let left = made(".lynkeus-fmu-abcDEF1234");
-        drop(File::create(left.join(LOCK)).unwrap());
+        drop(locked(&left, before));
         let used = made(".lynkeus-fmu-abcDEF1235");
-        let lock = File::create(used.join(LOCK)).unwrap();
+        let lock = locked(&used, before);
         lock.try_lock().unwrap();
         let young = made(".lynkeus-fmu-abcDEF1236");
+        // its run has made the lock, and takes it next
+        let new = made(".lynkeus-fmu-abcDEF1237");
+        let _lock = locked(&new, SystemTime::now());
         let other = made(".lynkeus-fmu-of-somebody");
         remove_left(place.path());
-        let is_there = [&left, &used, &young, &other].map(|folder| folder.exists());
-        assert_eq!(is_there, [false, true, true, true]);
+        let is_there = [&left, &used, &young, &new, &other].map(|folder| folder.exists());
+        assert_eq!(is_there, [false, true, true, true, true]);
     }
 }
