@@ -256,7 +256,6 @@ mod tests {
         let (found, _, last) = of.reach(5.0, &Budget::default(), see);
         assert_eq!(found, End::Reached);
         assert_eq!((jumps.len(), jumps.last()), (20, Some(&last)));
-        eprintln!("{last:?}");
         // narrow enough to say something
         assert!(
             last[2].magnitude() < 0.1 && last[3].magnitude() < 0.15,
