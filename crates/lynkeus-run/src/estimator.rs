@@ -74,7 +74,6 @@ const CALLS: usize = 16;
 struct Kept {
     /// nothing where the state is another one since then
     image: Vec<u64>,
-    calls: usize,
     /// of each call the time, whether there were signals, and the signals
     since: Vec<f64>,
 }
@@ -85,11 +84,10 @@ impl Kept {
     }
 
     fn add(&mut self, t: f64, signals: Option<&[f64]>, count: usize) {
-        self.calls += 1;
         self.since.extend([t, f64::from(signals.is_some())]);
         match signals {
             Some(signals) => self.since.extend_from_slice(signals),
-            None => self.since.resize(self.calls * (2 + count), 0.0),
+            None => self.since.resize(self.since.len() + count, 0.0),
         }
     }
 }
@@ -412,15 +410,14 @@ impl Estimator {
 
     /// Keeps the state, for a call that fails. What a smoother keeps does not come twice.
     fn keep(&mut self) {
-        let kept = &self.kept;
-        if !kept.image.is_empty() && kept.calls < CALLS && !self.runner.has_history() {
+        let (kept, most) = (&self.kept, CALLS * (2 + self.names.len()));
+        if !kept.image.is_empty() && kept.since.len() < most && !self.runner.has_history() {
             return;
         }
         let mut kept = std::mem::take(&mut self.kept);
         kept.image.clear();
         kept.since.clear();
-        kept.since.reserve(CALLS * (2 + self.names.len()));
-        kept.calls = 0;
+        kept.since.reserve(most);
         // a state that is there can be walked over
         let _ = self.walk(&mut Walk::Save(&mut kept.image), false);
         self.kept = kept;
