@@ -123,7 +123,7 @@ impl<'a> BySides<'a> {
     fn followed(&mut self, start: &[f64], first: &[f64]) -> Option<Vec<f64>> {
         let (mut z, mut tried) = (start.to_vec(), vec![first.to_vec()]);
         while let Some(held) = tried.last().filter(|_| tried.len() <= ROUNDS) {
-            let (end, is_root, there) = self.ended(&z, &held.clone());
+            let (end, is_root, there) = self.ended(&z, held);
             if is_root {
                 return Some(end);
             }
