@@ -137,8 +137,8 @@ equation
   i1 = s1*(if off1 then 1e-5 else 1);
   v2 = s2*(if off2 then 1 else 1e-5);
   i2 = s2*(if off2 then 1e-5 else 1);
-  10*sin(6.28*time) - 2*i1 - v1 = u;
-  -10*sin(6.28*time) - 2*i2 - v2 = u;
+  10*sin(6.25*time) - 2*i1 - v1 = u;
+  -10*sin(6.25*time) - 2*i2 - v2 = u;
   0.1*der(u) = i1 + i2 - 0.1*u;
 end Rectifier;
 ";
@@ -147,7 +147,7 @@ end Rectifier;
         false => over / (2.0 + 1e-5),
     };
     let slope = |t: f64, u: f64| {
-        let e = 10.0 * (6.28 * t).sin();
+        let e = 10.0 * (6.25 * t).sin();
         10.0 * (current(e - u) + current(-e - u)) - u
     };
     let (steps, mut u, mut expected) = (200_000, 0.0, vec![0.0]);
