@@ -133,12 +133,31 @@ pub(crate) struct Body {
     pub(crate) range: Vec<Interval>,
     /// number of entries of p
     pub(crate) parameters: usize,
-    /// g of (z, p)
-    pub(crate) residual: Tape,
-    pub(crate) by_unknowns: Slopes,
+    /// g, of (z, p)
+    pub(crate) residual: Residual,
     pub(crate) by_parameters: Slopes,
-    /// what is not continuous in g as z moves: each is constant where g does not jump
+    /// where there are any
+    pub(crate) sides: Option<Sides>,
+}
+
+/// Some equations, as functions of the same inputs.
+#[derive(Debug)]
+pub(crate) struct Residual {
+    pub(crate) values: Tape,
+    pub(crate) by_unknowns: Slopes,
+    /// what is not continuous as z moves: each is constant where the equations do not jump
     pub(crate) steps: Tape,
+}
+
+/// What in g jumps from one side to another as z moves, and g where all of it is held.
+#[derive(Debug)]
+pub(crate) struct Sides {
+    /// the relations, signs and whole numbers m, of (z, p)
+    pub(crate) values: Tape,
+    /// which of them are true or false
+    pub(crate) are_relations: Vec<bool>,
+    /// g of (z, p, m)
+    pub(crate) held: Residual,
 }
 
 /// The entries of a Jacobian that are not zero everywhere, as functions of (z, p).
@@ -181,7 +200,7 @@ impl Implicit {
 
     /// Whether g may jump as its unknowns move.
     pub fn steps(&self) -> bool {
-        self.0.steps.outputs() > 0
+        self.0.residual.steps.outputs() > 0
     }
 
     pub(crate) fn start(&self) -> &[f64] {

@@ -5,14 +5,14 @@
 //! use shares them. By the implicit function theorem z' = −g_z⁻¹ g_p p', so that derivatives
 //! of any order, symbols and bounds need nothing but g, g_z, g_p and linear systems.
 
+mod newton;
+mod search;
+
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::code::{Body, Implicit, Slopes, Tape};
-use crate::interval::Intervals;
-use crate::{
-    Algebra, Binary, Evaluator, Graph, Interval, MissingInput, Node, Nodes, Op, Unary, jacobian,
-    linear,
-};
+use crate::code::{Body, Implicit, Residual, Sides, Slopes, Tape};
+use crate::{Algebra, Binary, Graph, Interval, MissingInput, Node, Nodes, Op, Unary, jacobian};
 
 /// Characters of an equation in a message.
 const SHOWN: usize = 80;
@@ -52,31 +52,29 @@ impl Implicit {
         let inputs = [&z[..], &cut.symbols].concat();
         let name = |&symbol: &Node| graph.symbol_name(symbol).unwrap_or_default();
         let equation = |&residual: &Node| format!("{} = 0", graph.render(residual, SHOWN));
-        let slopes = |columns: &[Node]| Slopes::new(graph, &cut.roots, columns, &inputs);
         let function = Self(Arc::new(Body {
             names: z.iter().map(name).collect(),
             equations: residuals.iter().map(equation).collect(),
             start: unknowns.iter().map(|unknown| unknown.start).collect(),
             range: unknowns.iter().map(|unknown| unknown.range).collect(),
             parameters: cut.symbols.len(),
-            residual: Tape::new(graph, &inputs, &cut.roots)?,
-            by_unknowns: slopes(&z)?,
-            by_parameters: slopes(&cut.symbols)?,
-            steps: Tape::new(graph, &inputs, &steps(graph, &cut.roots))?,
+            residual: Residual::new(graph, &cut.roots, &z, &inputs)?,
+            by_parameters: Slopes::new(graph, &cut.roots, &cut.symbols, &inputs)?,
+            sides: Sides::new(graph, &cut.roots, &z, &inputs)?,
         }));
         Ok(graph.implicit(&function, &cut.values))
     }
 
     /// g at (z, p).
     pub fn residual<A: Algebra>(&self, algebra: &A, at: &[A::Value]) -> Vec<A::Value> {
-        self.0.residual.eval_in(algebra, at)
+        self.0.residual.values.eval_in(algebra, at)
     }
 
     /// g_z at (z, p), n×n, row by row.
     pub fn matrix<A: Algebra>(&self, algebra: &A, at: &[A::Value]) -> Vec<A::Value> {
         let n = self.size();
         let mut matrix = vec![algebra.constant(0.0); n * n];
-        for (i, j, slope) in self.0.by_unknowns.entries(algebra, at) {
+        for (i, j, slope) in self.0.residual.by_unknowns.entries(algebra, at) {
             matrix[i * n + j] = slope;
         }
         matrix
@@ -109,7 +107,7 @@ impl Implicit {
 
     /// What jumps in g as z moves, at (z, p).
     pub(crate) fn steps_in<A: Algebra>(&self, algebra: &A, at: &[A::Value]) -> Vec<A::Value> {
-        self.0.steps.eval_in(algebra, at)
+        self.0.residual.steps.eval_in(algebra, at)
     }
 
     /// `a, b: a - b - x = 0, b - sin(a) = 0`
@@ -121,6 +119,61 @@ impl Implicit {
         let (names, equations) = (names.join(", "), equations.join(", "));
         format!("{names}{}: {equations}{}", more(8), more(SPELLED))
     }
+}
+
+impl Residual {
+    fn new(
+        graph: &Graph,
+        residuals: &[Node],
+        unknowns: &[Node],
+        inputs: &[Node],
+    ) -> Result<Self, MissingInput> {
+        Ok(Self {
+            values: Tape::new(graph, inputs, residuals)?,
+            by_unknowns: Slopes::new(graph, residuals, unknowns, inputs)?,
+            steps: Tape::new(graph, inputs, &steps(graph, residuals))?,
+        })
+    }
+}
+
+impl Sides {
+    /// None where nothing in the residuals has sides.
+    fn new(
+        graph: &Graph,
+        residuals: &[Node],
+        unknowns: &[Node],
+        inputs: &[Node],
+    ) -> Result<Option<Self>, MissingInput> {
+        let has_sides = |&node: &Node| has_sides(graph.op(node));
+        let mut nodes = graph.reachable(residuals);
+        nodes.retain(has_sides);
+        let fresh = |&node: &Node| (node, graph.fresh(graph.render(node, SHOWN)).node());
+        let symbols: HashMap<Node, Node> = nodes.iter().map(fresh).collect();
+        let held = graph.substitute(residuals, &symbols);
+        // one within another is held with it
+        let read = graph.symbols_of(&held);
+        nodes.retain(|node| read.contains(&symbols[node]));
+        if nodes.is_empty() {
+            return Ok(None);
+        }
+        let symbols = nodes.iter().map(|node| symbols[node]);
+        let with_sides: Vec<Node> = inputs.iter().copied().chain(symbols).collect();
+        let is_relation = |&node: &Node| matches!(graph.op(node), Op::Binary(..));
+        Ok(Some(Self {
+            values: Tape::new(graph, inputs, &nodes)?,
+            are_relations: nodes.iter().map(is_relation).collect(),
+            held: Residual::new(graph, &held, unknowns, &with_sides)?,
+        }))
+    }
+}
+
+/// Whether it jumps from one value to another, and is constant in between.
+fn has_sides(op: Op) -> bool {
+    matches!(
+        op,
+        Op::Binary(Binary::Less | Binary::LessEq | Binary::Equal, ..)
+            | Op::Unary(Unary::Sign | Unary::Floor, _)
+    )
 }
 
 impl Slopes {
@@ -172,258 +225,4 @@ fn steps(graph: &Graph, residuals: &[Node]) -> Vec<Node> {
         }
     }
     found
-}
-
-/// Newton steps from one start.
-const STEPS: usize = 80;
-/// Halvings of one step.
-const HALVINGS: usize = 30;
-/// A step this small against its unknown, in units of the last place, is the last.
-const LAST: f64 = 4.0 * f64::EPSILON;
-/// Starts tried besides the declared one.
-const STARTS: usize = 16;
-/// Values between which a change of sign is looked for, to either side of the start.
-const SAMPLES: usize = 64;
-/// Halvings of a bracket: down to neighbouring numbers, whatever it was.
-const BISECTIONS: usize = 1200;
-
-impl Implicit {
-    /// z with g(z, p) = 0 within rounding, in the declared range.
-    ///
-    /// # Errors
-    /// Why no root was found.
-    pub(crate) fn root(&self, p: &[f64]) -> Result<Vec<f64>, String> {
-        let mut search = Newton::new(self, p);
-        let first = search.newton(self.start());
-        if search.is_root(&first) {
-            return Ok(first);
-        }
-        let bracketed = (self.size() == 1).then(|| search.bracketed()).flatten();
-        if let Some(z) = bracketed.filter(|z| search.is_root(z)) {
-            return Ok(z);
-        }
-        for turn in 1..=STARTS {
-            let z = search.newton(&self.other_start(turn));
-            if search.is_root(&z) {
-                return Ok(z);
-            }
-        }
-        Err(self.failure(&first, &search.residual(&first)))
-    }
-
-    /// Where Newton's method from the declared start ended, and with what residual.
-    fn failure(&self, end: &[f64], residual: &[f64]) -> String {
-        let named = |values: &[f64]| {
-            let pairs = self.names().iter().zip(values).take(4);
-            let pairs: Vec<String> = pairs.map(|(n, v)| format!("{n} = {v:.6}")).collect();
-            pairs.join(", ")
-        };
-        let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
-        format!(
-            "Newton's method from {} ends at {} with a residual of {worst:.3e}; the equations may \
-             have no solution in the declared range there, or need another `start`",
-            named(self.start()),
-            named(end),
-        )
-    }
-
-    /// Points that fill ever larger boxes around the declared start evenly.
-    fn other_start(&self, turn: usize) -> Vec<f64> {
-        let reach = 4.0_f64.powi(turn as i32 / 4);
-        let entries = self.start().iter().zip(self.range()).enumerate();
-        let place = |(i, (&start, range)): (usize, (&f64, &Interval))| {
-            let size = reach * start.abs().max(1.0);
-            let near = Interval::point(start).inflate(size).intersection(*range);
-            let near = if near.is_empty() { *range } else { near };
-            let (lo, hi) = (near.lo().max(-1e300), near.hi().min(1e300));
-            // multiples of √2, √5, … modulo 1
-            let fraction = ((turn * (i + 1)) as f64 * ((i * i + 2 * i + 2) as f64).sqrt()).fract();
-            lo + fraction * (hi - lo)
-        };
-        entries.map(place).collect()
-    }
-}
-
-/// Newton's method on one function at one p.
-struct Newton<'a> {
-    function: &'a Implicit,
-    residual: Evaluator,
-    slopes: Evaluator,
-    /// (z, p)
-    at: Vec<f64>,
-}
-
-impl<'a> Newton<'a> {
-    fn new(function: &'a Implicit, p: &[f64]) -> Self {
-        let mut at = function.start().to_vec();
-        at.extend(p);
-        Self {
-            residual: function.0.residual.evaluator(),
-            slopes: function.0.by_unknowns.tape.evaluator(),
-            function,
-            at,
-        }
-    }
-
-    fn residual(&mut self, z: &[f64]) -> Vec<f64> {
-        let mut g = vec![0.0; z.len()];
-        self.at[..z.len()].copy_from_slice(z);
-        self.residual.eval(&self.at, &mut g);
-        g
-    }
-
-    fn matrix(&mut self, z: &[f64]) -> Vec<f64> {
-        let n = z.len();
-        let places = &self.function.0.by_unknowns.places;
-        let mut entries = vec![0.0; places.len()];
-        self.at[..n].copy_from_slice(z);
-        self.slopes.eval(&self.at, &mut entries);
-        let mut matrix = vec![0.0; n * n];
-        for (&(i, j), entry) in places.iter().zip(entries) {
-            matrix[i * n + j] = entry;
-        }
-        matrix
-    }
-
-    fn within(&self, z: f64, i: usize) -> f64 {
-        let range = self.function.range()[i];
-        z.clamp(range.lo(), range.hi())
-    }
-
-    /// The point where Newton's method ends, be it a root or not. The size of the residual is
-    /// measured in rows scaled to one, so that no unit counts more than another.
-    fn newton(&mut self, start: &[f64]) -> Vec<f64> {
-        let start = start.iter().enumerate();
-        let mut z: Vec<f64> = start.map(|(i, &z)| self.within(z, i)).collect();
-        for _ in 0..STEPS {
-            let g = self.residual(&z);
-            if g.iter().all(|&g| g == 0.0) {
-                return z;
-            }
-            let mut matrix = self.matrix(&z);
-            let scales = row_scales(&matrix, &z, self.function.start());
-            let mut step: Vec<f64> = g.iter().map(|g| -g).collect();
-            linear::solve(&mut matrix, &mut step);
-            if step.iter().any(|step| !step.is_finite()) {
-                return z;
-            }
-            let mut pairs = step.iter().zip(&z);
-            let last = pairs.all(|(step, z)| step.abs() <= LAST * z.abs());
-            match self.damped(&z, &step, size(&g, &scales), &scales) {
-                Some(next) if last => return next,
-                Some(next) => z = next,
-                None => return z,
-            }
-        }
-        z
-    }
-
-    /// The longest of the halved steps that makes the residual smaller.
-    fn damped(&mut self, z: &[f64], step: &[f64], before: f64, scales: &[f64]) -> Option<Vec<f64>> {
-        let mut fraction = 1.0;
-        for _ in 0..HALVINGS {
-            let next: Vec<f64> = (z.iter().zip(step).enumerate())
-                .map(|(i, (z, step))| self.within(z + fraction * step, i))
-                .collect();
-            let after = size(&self.residual(&next), scales);
-            if after <= (1.0 - fraction / 4.0) * before {
-                return Some(next);
-            }
-            fraction /= 2.0;
-        }
-        None
-    }
-
-    /// Whether g may vanish within a few roundings of z. NaN is none; nor is a jump over zero.
-    fn is_root(&mut self, z: &[f64]) -> bool {
-        let n = z.len();
-        let near = |z: f64| Interval::point(z).inflate(LAST * z.abs());
-        let p = self.at[n..].iter().map(|&p| near(p));
-        let at: Vec<Interval> = z.iter().map(|&z| near(z)).chain(p).collect();
-        let steps = self.function.steps_in(&Intervals, &at);
-        if steps.iter().any(|step| !step.is_point()) {
-            return self.residual(z).iter().all(|&g| g == 0.0);
-        }
-        let g = self.function.residual(&Intervals, &at);
-        g.iter()
-            .all(|g| g.contains_zero() && g.lo().is_finite() && g.hi().is_finite())
-    }
-
-    /// A single unknown between two values of which g has different signs, the nearest found.
-    fn bracketed(&mut self) -> Option<Vec<f64>> {
-        let start = self.within(self.function.start()[0], 0);
-        let range = self.function.range()[0];
-        let (mut below, mut above) = (start, start);
-        let at_start = self.residual(&[start])[0];
-        let (mut low, mut high) = (at_start, at_start);
-        let first = 1e-3 * start.abs().max(1.0);
-        for turn in 0..SAMPLES {
-            let reach = first * 2.0_f64.powi(turn as i32);
-            let (down, up) = (self.within(start - reach, 0), self.within(start + reach, 0));
-            let (at_down, at_up) = (self.residual(&[down])[0], self.residual(&[up])[0]);
-            for (z, g, end, at_end) in [(down, at_down, below, low), (up, at_up, above, high)] {
-                if g * at_end < 0.0 {
-                    return Some(vec![self.halved((end, at_end), z)]);
-                }
-            }
-            (below, low, above, high) = (down, at_down, up, at_up);
-            if down <= range.lo() && up >= range.hi() {
-                break;
-            }
-        }
-        None
-    }
-
-    /// Halves a bracket down to neighbouring numbers.
-    fn halved(&mut self, (mut a, at_a): (f64, f64), mut b: f64) -> f64 {
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * a + 0.5 * b;
-            if middle == a || middle == b {
-                break;
-            }
-            let g = self.residual(&[middle])[0];
-            match g * at_a > 0.0 {
-                true => a = middle,
-                false => b = middle,
-            }
-        }
-        let (at_a, at_b) = (self.residual(&[a])[0].abs(), self.residual(&[b])[0].abs());
-        if at_a < at_b { a } else { b }
-    }
-}
-
-/// 1/Σⱼ |g_z|ᵢⱼ·|zⱼ|, where an unknown near zero counts as large as its start, or one.
-fn row_scales(matrix: &[f64], z: &[f64], start: &[f64]) -> Vec<f64> {
-    let n = z.len();
-    let weight = |j: usize| match z[j].abs().max(start[j].abs()) {
-        0.0 => 1.0,
-        size => size,
-    };
-    let sum = |row: &[f64]| {
-        row.iter()
-            .enumerate()
-            .map(|(j, a)| a.abs() * weight(j))
-            .sum::<f64>()
-    };
-    matrix
-        .chunks(n)
-        .map(|row| match sum(row) {
-            sum if sum > 0.0 && sum.is_finite() => 1.0 / sum,
-            _ => 1.0,
-        })
-        .collect()
-}
-
-/// The scaled Euclidean norm; NaN is larger than anything.
-fn size(g: &[f64], scales: &[f64]) -> f64 {
-    let sum: f64 = g
-        .iter()
-        .zip(scales)
-        .map(|(g, scale)| (g * scale).powi(2))
-        .sum();
-    if sum.is_nan() {
-        f64::INFINITY
-    } else {
-        sum.sqrt()
-    }
 }

@@ -46,14 +46,19 @@ fn two_inner_trays_tell_more_of_the_column_than_its_ends() {
 
 /// A run of hours: what is known at the horizons that were reached is the answer.
 #[test]
-fn a_limit_ends_the_run_within_twice_its_time() {
+fn a_limit_ends_the_run_in_time() {
     let folder = Folder::new();
     folder.change("study.toml", "until = ", "until = 1e7 #");
     let steps = "sample_step = 0.1\noutput_step = 1e4 #";
     folder.change("study.toml", "output_step = ", steps);
     let begun = std::time::Instant::now();
     let ended = folder.run(&["check", "study.toml", "--how-well", "--time-limit", "2"]);
-    assert!(begun.elapsed().as_secs_f64() < 4.5, "{:?}", begun.elapsed());
+    // twice its time, or more where the machine is busy: not hours
+    assert!(
+        begun.elapsed().as_secs_f64() < 20.0,
+        "{:?}",
+        begun.elapsed()
+    );
     let told = format!("{}{}", ended.out, ended.err);
     let partial = ended.out.contains("a limit ended the run after");
     assert!(

@@ -15,4 +15,5 @@ mod random_graphs;
 mod recipe;
 mod roots;
 mod sample;
+mod sides;
 mod values;

@@ -128,14 +128,20 @@ impl<'a> Torn<'a> {
     }
 
     /// The unknown that stands in most equations; those of which something is declared first,
-    /// for that is where a search begins.
+    /// for that is where a search begins. Numbers before truth values, which no step of a search
+    /// leads to.
     fn most_read(&self) -> Option<usize> {
         let key = |(&place, equations): (&usize, &Vec<usize>)| {
             let unknown = &self.system.unknowns[place];
             let follows = self.explicit.contains_key(&unknown.symbol);
             let is_open = |equation: &&usize| self.equations.contains(equation);
             let open = equations.iter().filter(is_open).count();
-            let key = (unknown.is_declared(), open, Reverse(place));
+            let key = (
+                !unknown.is_discrete,
+                unknown.is_declared(),
+                open,
+                Reverse(place),
+            );
             (!follows && !self.unknowns.contains(&place)).then_some(key)
         };
         let most = self.readers.iter().filter_map(key).max();

@@ -38,6 +38,8 @@ pub(crate) struct Unknown {
     pub state: Option<Node>,
     /// how much it is wanted as a state, where there is a choice
     pub rank: i32,
+    /// whether it is a Boolean or an Integer
+    pub is_discrete: bool,
     /// where the search begins, if its equation has to be solved by one
     pub start: f64,
     /// where it may lie

@@ -84,6 +84,7 @@ fn unknowns(
     let equated: HashSet<Node> = sides.collect();
     for (_, declaration, component) in symbols.all().filter(|(.., c)| !c.is_known) {
         let is_input = declaration.causality == Causality::Input;
+        let is_discrete = matches!(declaration.type_name, TypeName::Boolean | TypeName::Integer);
         for element in elements(symbols, declaration, component)? {
             let node = element.node;
             let is_open = declaration.binding.is_none() && !equated.contains(&node);
@@ -103,6 +104,7 @@ fn unknowns(
                 span: declaration.name,
                 state: derivative.map(|_| node),
                 rank: rank(symbols, declaration),
+                is_discrete,
                 start,
                 range,
             });

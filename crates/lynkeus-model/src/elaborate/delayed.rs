@@ -57,6 +57,7 @@ impl Delayed {
             span: self.at,
             state: Some(*state),
             rank: 40,
+            is_discrete: false,
             start: 0.0,
             range: Interval::ENTIRE,
         })

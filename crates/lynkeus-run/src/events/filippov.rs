@@ -558,6 +558,8 @@ impl<'a> Filippov<'a> {
         let path = guards.inputs(Poly::line(t, h), states, &self.at.beside, beside);
         let path: Vec<Poly> = path.collect();
         let shortest = SHORTEST.max(resolution(t + h) / h);
+        let samples = guards.samples(&path);
+        let along = (&path[..], &samples[..]);
         let mut first = Ahead::Nothing;
         for (i, guard) in guards.at_surfaces.iter().enumerate() {
             if self.is_bound(i) {
@@ -568,13 +570,13 @@ impl<'a> Filippov<'a> {
                 true => REACHED * self.at.largest[i],
                 false => ROUNDED * self.at.largest[i] + f64::MIN_POSITIVE,
             };
-            match guard.passage(&path, side, band, shortest, first.at()) {
+            match guard.passage(along, side, band, shortest, first.at()) {
                 Ahead::Nothing => {}
                 found => first = found,
             }
         }
         for guard in &guards.bends {
-            if let Some(at) = guard.bend(&path, shortest, first.at()) {
+            if let Some(at) = guard.bend(along, shortest, first.at()) {
                 first = Ahead::Stop { at };
             }
         }

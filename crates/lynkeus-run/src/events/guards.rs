@@ -51,6 +51,8 @@ pub struct Guards {
     pub(super) at_surfaces: Vec<Guard>,
     /// where something bends and does not jump
     pub(super) bends: Vec<Guard>,
+    /// those that are sampled, together, over all that is read: a loop is searched once for all
+    sampled: Option<Tape>,
 }
 
 impl Guards {
@@ -72,15 +74,43 @@ impl Guards {
         let reads: Vec<usize> = (0..inputs.len())
             .filter(|&i| symbols.contains(&inputs[i]))
             .collect();
-        let guard = |&node: &Node| Guard::new(graph, inputs, &reads, node);
-        let guards = |nodes: &[Node]| nodes.iter().map(guard).collect::<Result<_, _>>();
+        let mut sampled = vec![];
+        let mut guard = |&node: &Node| {
+            let mut guard = Guard::new(graph, inputs, &reads, node)?;
+            if is_sampled(graph, node) {
+                guard.sampled = Some(sampled.len());
+                sampled.push(node);
+            }
+            Ok(guard)
+        };
+        let mut guards = |nodes: &[Node]| nodes.iter().map(&mut guard).collect::<Result<_, _>>();
+        let (at_surfaces, bends) = (guards(&at_surfaces)?, guards(bends)?);
+        let read: Vec<Node> = reads.iter().map(|&i| inputs[i]).collect();
+        let tape = || Tape::new(graph, &read, &sampled);
         Ok(Some(Arc::new(Self {
-            at_surfaces: guards(&at_surfaces)?,
+            sampled: (!sampled.is_empty()).then(tape).transpose()?,
+            at_surfaces,
             surfaces: surfaces.to_vec(),
-            bends: guards(bends)?,
+            bends,
             states,
             reads,
         })))
+    }
+
+    /// Values of what is sampled along a path, each at all places.
+    pub(super) fn samples(&self, path: &[Poly]) -> Vec<Vec<f64>> {
+        let Some(tape) = &self.sampled else {
+            return vec![];
+        };
+        let mut columns = vec![vec![]; tape.outputs()];
+        for place in places() {
+            let read: Vec<f64> = path.iter().map(|poly| poly.at(place)).collect();
+            let values = tape.eval_in(&Reals, &read);
+            for (column, value) in columns.iter_mut().zip(values) {
+                column.push(value);
+            }
+        }
+        columns
     }
 
     /// What there is for each input that is read: for time, for a state, or for what is read beside
@@ -100,6 +130,17 @@ impl Guards {
     }
 }
 
+/// Where a step is sampled.
+fn places() -> impl Iterator<Item = f64> {
+    (1..=SAMPLES).map(|k| k as f64 / SAMPLES as f64)
+}
+
+/// Whether the node reads an algebraic loop with conditions.
+fn is_sampled(graph: &Graph, node: Node) -> bool {
+    let mut nodes = graph.reachable(&[node]).into_iter();
+    nodes.any(|node| matches!(graph.op(node), Op::System(_)) && graph.jumps(node))
+}
+
 /// A function of some of the inputs that are read.
 #[derive(Debug)]
 pub(super) struct Guard {
@@ -110,6 +151,9 @@ pub(super) struct Guard {
     affine: Option<(f64, Vec<f64>)>,
     /// nothing in it jumps: it has slopes everywhere, but for bends
     has_slopes: bool,
+    /// its place among what is sampled, where it reads an algebraic loop with conditions: over a
+    /// stretch the roots of such a loop are not enclosed
+    sampled: Option<usize>,
 }
 
 impl Guard {
@@ -143,11 +187,15 @@ impl Guard {
             reads,
             tape,
             has_slopes,
+            sampled: None,
         })
     }
 
     /// An enclosure for what is read in such boxes (centre and radius of each).
     pub fn over(&self, boxes: &[[f64; 2]]) -> Option<[f64; 2]> {
+        if self.sampled.is_some() {
+            return Some([f64::NEG_INFINITY, f64::INFINITY]);
+        }
         let Some((constant, weights)) = &self.affine else {
             return self.enclosed(|i| {
                 let [centre, reach] = boxes[i];
@@ -176,7 +224,7 @@ impl Guard {
 
     /// The function along a path, what the guards read as polynomials: for the search for where it
     /// leaves a side.
-    fn along<'a>(&'a self, path: &'a [Poly], shortest: f64) -> Search<'a> {
+    fn along<'a>(&'a self, path: &'a [Poly], samples: &'a [Vec<f64>], shortest: f64) -> Search<'a> {
         let polynomial = self.affine.as_ref().map(|(constant, weights)| {
             let parts = self.reads.iter().map(|&i| &path[i]).zip(weights);
             Poly::combined(*constant, parts)
@@ -185,6 +233,7 @@ impl Guard {
             guard: self,
             path,
             polynomial,
+            samples: self.sampled.map(|place| &samples[place][..]),
             side: 1.0,
             level: 0.0,
             band: 0.0,
@@ -196,7 +245,7 @@ impl Guard {
     /// to its level as `band`.
     pub fn passage(
         &self,
-        path: &[Poly],
+        (path, samples): (&[Poly], &[Vec<f64>]),
         (side, level): (f64, f64),
         band: f64,
         shortest: f64,
@@ -206,14 +255,19 @@ impl Guard {
             side,
             level,
             band,
-            ..self.along(path, shortest)
+            ..self.along(path, samples, shortest)
         };
         search.first(0.0, limit)
     }
 
     /// Where something bends first, before `limit`.
-    pub fn bend(&self, path: &[Poly], shortest: f64, limit: f64) -> Option<f64> {
-        let along = self.along(path, shortest);
+    pub fn bend(
+        &self,
+        (path, samples): (&[Poly], &[Vec<f64>]),
+        shortest: f64,
+        limit: f64,
+    ) -> Option<f64> {
+        let along = self.along(path, samples, shortest);
         let [a, b] = [0.0, 1.0].map(|s| along.value(s).abs());
         let band = 1e-13 * a.max(b);
         // where a step begins at a bend what follows tells the side
@@ -280,6 +334,8 @@ struct Search<'a> {
     path: &'a [Poly],
     /// the function, where it is affine
     polynomial: Option<Poly>,
+    /// its values at some places, where they are all that is known of it
+    samples: Option<&'a [f64]>,
     side: f64,
     level: f64,
     /// nobody asks which side it is so close
@@ -349,6 +405,9 @@ impl Search<'_> {
         if begins < 0.0 {
             self.band = self.band.max(-2.0 * begins);
         }
+        if let Some(samples) = self.samples {
+            return self.among(samples, limit);
+        }
         let mut left = vec![(from, limit)];
         for _ in 0..LOOKS {
             let Some((from, to)) = left.pop() else {
@@ -375,6 +434,16 @@ impl Search<'_> {
     fn sampled(&self, from: f64, to: f64) -> Ahead {
         let samples = (1..=SAMPLES).map(|k| from + (to - from) * k as f64 / SAMPLES as f64);
         self.at(samples)
+    }
+
+    /// What the values of a step tell, the first such thing before `limit`.
+    fn among(&self, samples: &[f64], limit: f64) -> Ahead {
+        let margins = samples.iter().map(|value| self.side * (value - self.level));
+        let mut before = places()
+            .zip(margins)
+            .take_while(|(place, _)| *place <= limit);
+        let passed = before.find(|(_, margin)| *margin < -self.band);
+        passed.map_or(Ahead::Nothing, |(place, _)| self.jump(place))
     }
 
     /// What the values at some places tell, the first such thing.

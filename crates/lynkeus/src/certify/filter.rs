@@ -124,7 +124,8 @@ impl FilterTube {
             .zip(flow.inputs.iter().copied())
             .collect();
         self.notes.clone_from(&system.notes);
-        let noisy = self.followed(system, &system.sampled, budget);
+        // of the time that is left: some remains for what is asked after this
+        let noisy = self.followed(system, &system.sampled, &budget.part(0.5));
         self.obstacle.clone_from(&noisy.obstacle);
         if self.obstacle.is_none() {
             self.verdict = Standing::Proved;
@@ -132,7 +133,7 @@ impl FilterTube {
         self.noisy = Some(noisy);
         let mut exact = system.sampled.clone();
         exact.errors.fill(0.0);
-        self.exact = Some(self.followed(system, &exact, budget));
+        self.exact = Some(self.followed(system, &exact, &budget.part(0.5)));
     }
 
     fn followed(&self, system: &System, sampled: &Sampled, budget: &Budget) -> Followed {

@@ -114,3 +114,73 @@ end Amplifier;
     let expected = include_str!("amplifier.csv");
     near(&column(&table, "v"), column(expected, "v"), 2e-6);
 }
+
+/// Two diodes in a loop with their resistors, whose Booleans follow from the currents and the currents from them: a
+/// rectifier, beside steps of Runge and Kutta over its currents written out.
+#[test]
+fn diodes_in_a_loop_rectify() {
+    let model = "model Rectifier
+  Real u(start = 0);
+  Real s1;
+  Real s2;
+  Real i1;
+  Real i2;
+  Real v1;
+  Real v2;
+  Boolean off1(start = true);
+  Boolean off2(start = true);
+  output Real y = u;
+equation
+  off1 = s1 < 0;
+  off2 = s2 < 0;
+  v1 = s1*(if off1 then 1 else 1e-5);
+  i1 = s1*(if off1 then 1e-5 else 1);
+  v2 = s2*(if off2 then 1 else 1e-5);
+  i2 = s2*(if off2 then 1e-5 else 1);
+  10*sin(6.25*time) - 2*i1 - v1 = u;
+  -10*sin(6.25*time) - 2*i2 - v2 = u;
+  0.1*der(u) = i1 + i2 - 0.1*u;
+end Rectifier;
+";
+    let current = |over: f64| match over < 0.0 {
+        true => 1e-5 * over / (1.0 + 2e-5),
+        false => over / (2.0 + 1e-5),
+    };
+    let slope = |t: f64, u: f64| {
+        let e = 10.0 * (6.25 * t).sin();
+        10.0 * (current(e - u) + current(-e - u)) - u
+    };
+    let (steps, mut u, mut expected) = (200_000, 0.0, vec![0.0]);
+    let h = 1.0 / f64::from(steps);
+    for k in 0..steps {
+        let t = h * f64::from(k);
+        let a = slope(t, u);
+        let b = slope(t + 0.5 * h, u + 0.5 * h * a);
+        let c = slope(t + 0.5 * h, u + 0.5 * h * b);
+        let d = slope(t + h, u + h * c);
+        u += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+        if (k + 1) % (steps / 20) == 0 {
+            expected.push(u);
+        }
+    }
+    for (method, most) in [("adaptive", 1e-6), ("stiff", 1e-6), ("rk4", 1e-3)] {
+        let step = if method == "rk4" { "step = 1e-3\n" } else { "" };
+        let simulate = format!("until = 1\noutput_step = 0.05\nmethod = \"{method}\"\n{step}");
+        let table = simulated(model, &simulate);
+        near(&column(&table, "u"), expected.iter().copied(), most);
+    }
+}
+
+/// A triac of two thyristors whose gates stand behind diodes (`SimpleTriacCircuit`), beside `triac.py`.
+#[test]
+fn a_triac_is_that_of_scipy() {
+    let table = simulated(
+        include_str!("triac.mo"),
+        "until = 1e-4\noutput_step = 4e-6\nmethod = \"stiff\"\nrtol = 1e-7\n",
+    );
+    let expected = include_str!("triac.csv");
+    near(&column(&table, "i"), column(expected, "i"), 1e-6);
+    for control in ["control1", "control2"] {
+        near(&column(&table, control), column(expected, control), 1e-6);
+    }
+}

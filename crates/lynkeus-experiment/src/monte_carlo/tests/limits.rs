@@ -73,7 +73,11 @@ fn a_limit_of_time_ends_runs_between_two_rows() {
     let error = runs(&study, 8).unwrap_err().to_string();
     let words = "s.toml: undecided: the limit of 0.5 s ended it";
     assert!(error.contains(words), "{error}");
-    assert!(begun.elapsed().as_secs_f64() < 5.0, "{:?}", begun.elapsed());
+    assert!(
+        begun.elapsed().as_secs_f64() < 20.0,
+        "{:?}",
+        begun.elapsed()
+    );
 }
 
 /// What is wrong with all of them is told with the study's name, as for one run.
