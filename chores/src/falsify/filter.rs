@@ -295,7 +295,7 @@ impl<'a> Attack<'a> {
             }
             self.judge(t, &x, &estimator, &mut worst, &mut seen);
             let next = self.times.get(k + 1).copied();
-            let half = (next.is_some()).then(|| t + 0.5 * every);
+            let half = next.map(|_| t + 0.5 * every);
             let last = next.unwrap_or(self.followed.reached);
             for until in half.into_iter().chain([last]) {
                 let from = estimator.time().unwrap_or(t);
