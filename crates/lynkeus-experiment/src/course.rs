@@ -23,6 +23,7 @@ pub mod sampling;
 mod screen;
 pub(crate) mod taken;
 pub(crate) mod trace;
+pub(crate) mod units;
 
 use lynkeus_expr::Spent;
 use lynkeus_observers::Observer;

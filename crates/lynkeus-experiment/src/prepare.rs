@@ -162,6 +162,8 @@ pub struct Prepared<'a> {
     examinations: OnceCell<Vec<Examination>>,
     /// the same
     choice: OnceCell<Option<Choice>>,
+    /// the first observer whose gain is certified, and its tuning: a search for each who asks would take long
+    certified: OnceCell<(Tuning, Design)>,
 }
 
 /// The observer of a study.
@@ -210,6 +212,7 @@ impl<'a> Prepared<'a> {
             augmented,
             examinations: OnceCell::new(),
             choice: OnceCell::new(),
+            certified: OnceCell::new(),
         })
     }
 
@@ -248,6 +251,7 @@ impl<'a> Prepared<'a> {
             augmented: self.augmented.clone(),
             examinations: OnceCell::new(),
             choice: OnceCell::new(),
+            certified: OnceCell::new(),
         })
     }
 
@@ -346,6 +350,9 @@ impl<'a> Prepared<'a> {
         {
             return Ok(design.clone());
         }
+        if let Some((_, design)) = self.certified.get().filter(|(of, _)| of == tuning) {
+            return Ok(design.clone());
+        }
         let mut tuned = choice.completed(tuning);
         // a certified gain holds for the known inputs as the study simulates them
         let simulated = match is_certified_gain(tuning) {
@@ -358,7 +365,12 @@ impl<'a> Prepared<'a> {
         };
         let place = simulated.as_ref().unwrap_or(&self.augmented);
         let design = choice.family.design(place, &tuned);
-        design.map_err(|error| self.refusal(error))
+        let design = design.map_err(|error| self.refusal(error))?;
+        if simulated.is_some() {
+            self.certified
+                .get_or_init(|| (tuning.clone(), design.clone()));
+        }
+        Ok(design)
     }
 
     /// The plant on a smaller box.

@@ -376,7 +376,7 @@ impl Table {
         );
         let near = nearest(name, self.names()).unwrap_or("…");
         Error::input(found).at(self.place()).hint(format!(
-            "if it has another name, set time = \"{near}\" in [estimate] of the study"
+            "if it has another name, set time = \"{near}\" in [log] of the study"
         ))
     }
 

@@ -82,6 +82,11 @@ fn every_command_refuses_a_stranger_in_any_section() {
             "columns: the plant 'M' has no output, input or state named \"nope\"",
         ),
         (
+            "[estimate]",
+            "columns = { time = \"t / s\" }",
+            "if it is the column of time, set time = \"t / s\" in [log]",
+        ),
+        (
             "[compare]",
             "families = [\"nope\"]",
             "s.toml:10:13: families of [compare]: no family is called \"nope\"",

@@ -55,7 +55,7 @@ fn wrong_columns() {
     let text = refused(line(1, "time,level,pump"), 2);
     says(
         &text,
-        &["no time column \"t\"", "in [estimate]", "set time = \""],
+        &["no time column \"t\"", "in [log]", "set time = \""],
     );
 }
 

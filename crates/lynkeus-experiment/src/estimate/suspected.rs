@@ -13,6 +13,7 @@ use crate::Series;
 use crate::course::doubt::{Doubt, Kind, Level};
 use crate::course::replay::Watch;
 use crate::course::run::start_at_readings;
+use crate::course::units::{CHANGES, Change};
 use crate::course::{Course, Samples};
 use crate::estimate::followed::followed;
 use crate::prepare::headers::header;
@@ -33,58 +34,6 @@ const MOST: f64 = 1.5;
 
 /// Where readings that are still smaller agree as well, a change shows nothing: a plant may rest at 0.
 const SMALLER: [f64; 2] = [0.2, 0.02];
-
-/// A usual change of a reading y: factor·y + offset.
-struct Change {
-    factor: f64,
-    offset: f64,
-    /// over the header `{}`
-    expression: &'static str,
-    /// what was read then
-    cause: &'static str,
-}
-
-const fn change(factor: f64, offset: f64, expression: &'static str, cause: &'static str) -> Change {
-    Change {
-        factor,
-        offset,
-        expression,
-        cause,
-    }
-}
-
-const CHANGES: [Change; 15] = [
-    change(0.1, 0.0, "{} / 10", "ten times too large"),
-    change(10.0, 0.0, "{} * 10", "ten times too small"),
-    change(1e-2, 0.0, "{} / 100", "in per cent, or in centimetres"),
-    change(1e2, 0.0, "{} * 100", "a hundred times too small"),
-    change(1e-3, 0.0, "{} / 1000", "in thousandths"),
-    change(1e3, 0.0, "{} * 1000", "in thousands"),
-    change(1e-5, 0.0, "{} / 1e5", "in pascal beside a model in bar"),
-    change(1e5, 0.0, "{} * 1e5", "in bar beside a model in pascal"),
-    change(1.0 / 1.8, -32.0 / 1.8, "({} - 32) / 1.8", "in °F"),
-    change(
-        1.0,
-        -273.15,
-        "{} - 273.15",
-        "in kelvin beside a model in °C",
-    ),
-    change(1.0, 273.15, "{} + 273.15", "in °C beside a model in kelvin"),
-    change(
-        std::f64::consts::PI / 180.0,
-        0.0,
-        "{} * pi / 180",
-        "in degrees",
-    ),
-    change(
-        180.0 / std::f64::consts::PI,
-        0.0,
-        "{} * 180 / pi",
-        "in radians",
-    ),
-    change(1.0 / 3.6, 0.0, "{} / 3.6", "in km/h"),
-    change(-1.0, 0.0, "-{}", "with the other sign"),
-];
 
 /// A doubt that names the column of a log that seems to be another quantity; none where nothing contradicts the model,
 /// or no single change explains it.
@@ -113,9 +62,8 @@ pub(super) fn suspected(
                     readings[sensor] = change.of(&readings[sensor])
                 })
             };
-            let is_scale = change.offset == 0.0 && change.factor > 0.0;
             let shows_nothing =
-                || is_scale && SMALLER.iter().any(|&by| agrees(&change.smaller(by), 0.0));
+                || change.is_scale() && SMALLER.iter().any(|&by| agrees(&change.smaller(by), 0.0));
             if agrees(change, LEAST) && !shows_nothing() {
                 found.push(trial.scaled(sensor, change));
             }
@@ -129,23 +77,6 @@ pub(super) fn suspected(
         }
     }
     found.pop().filter(|_| found.is_empty())
-}
-
-impl Change {
-    /// Another unit that makes smaller numbers still.
-    fn smaller(&self, by: f64) -> Self {
-        change(
-            by * self.factor,
-            by * self.offset,
-            self.expression,
-            self.cause,
-        )
-    }
-
-    fn of(&self, readings: &Series) -> Series {
-        let values = readings.iter().map(|y| self.factor * y + self.offset);
-        values.collect::<Vec<_>>().into()
-    }
 }
 
 /// How many times as large as expected the innovations of each sensor are; of one whose readings the gate keeps out,

@@ -5,6 +5,7 @@ use lynkeus_words::figures;
 
 use super::Evidence;
 use crate::course::doubt::{Doubt, Kind, Level};
+use crate::course::units::within;
 use crate::judge::outside::percent;
 use crate::words::{instant, number, side};
 use crate::{Quantity, Series};
@@ -343,13 +344,22 @@ fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
         Some(_) => format!("the declared range of {}", quantity.name),
         None => "its declared range".to_owned(),
     };
+    let unit = || {
+        let declared = evidence.declared.iter().find(|v| v.name == quantity.name)?;
+        let change = within([declared.min, declared.max], quantity.measured.as_ref()?)?;
+        let (cause, changed) = (change.cause, change.expression.replace("{}", name));
+        Some(format!(
+            "they look as if they were {cause}, and lie in it as {changed} (columns of [log])"
+        ))
+    };
     (2 * count > rows).then(|| Doubt {
         kind: Kind::Range,
         name: name.clone(),
         text: format!(
-            "the readings of {name} are outside of {range} in {} of the rows, by up to {} times its width: is their unit the model's?",
+            "the readings of {name} are outside of {range} in {} of the rows, by up to {} times its width: {}",
             percent(count as f64 / rows as f64),
-            figures(farthest, 2)
+            figures(farthest, 2),
+            unit().unwrap_or_else(|| "is their unit the model's?".to_owned())
         ),
         level: match is_elsewhere && evidence.replayed {
             true => Level::Refusal,

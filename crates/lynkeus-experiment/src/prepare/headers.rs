@@ -126,7 +126,7 @@ pub(crate) fn time_of<'s>(
             crate::near::list(table.names())
         ))
         .at(table.place())
-        .hint("if it has another name, set `time` in [estimate] of the study"));
+        .hint("if it has another name, set `time` in [log] of the study"));
     }
     Ok(time)
 }
@@ -193,13 +193,19 @@ pub(crate) fn refuse_stray_columns(
         .find(|(name, _)| !names().any(|n| n == name.text))
     {
         None => Ok(()),
-        Some((name, _)) => Err(name.blame(
-            Error::input(format!(
+        Some((name, header)) => {
+            let hint = match ["t", "time"].contains(&name.text.as_str()) {
+                true => {
+                    format!("if it is the column of time, set time = \"{header}\" in [log]")
+                }
+                false => crate::near::suggest(&name.text, names()),
+            };
+            let what = format!(
                 "columns: the plant '{}' has no output, input or state named \"{name}\"",
                 plant.name
-            ))
-            .hint(crate::near::suggest(&name.text, names())),
-        )),
+            );
+            Err(name.blame(Error::input(what).hint(hint)))
+        }
     }
 }
 
