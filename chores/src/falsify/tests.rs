@@ -272,9 +272,10 @@ fn runs_of_a_filter_leave_a_tube_that_is_too_narrow() {
         let noisy = tube.noisy.as_mut().unwrap();
         noisy.error_end.iter_mut().for_each(tenth_less);
     };
-    let row = |tube: &mut FilterTube| {
+    let rows = |tube: &mut FilterTube| {
         let noisy = tube.noisy.as_mut().unwrap();
-        noisy.rows[150].2[..2].iter_mut().for_each(tenth_less);
+        let rows = noisy.rows[135..165].iter_mut();
+        rows.for_each(|row| row.2[..2].iter_mut().for_each(narrower));
     };
     let deviation = |tube: &mut FilterTube| {
         let noisy = tube.noisy.as_mut().unwrap();
@@ -284,7 +285,7 @@ fn runs_of_a_filter_leave_a_tube_that_is_too_narrow() {
     };
     let found = [
         filtered("end", end),
-        filtered("row", row),
+        filtered("rows", rows),
         filtered("sd", deviation),
     ];
     assert!(found.iter().all(|ratio| *ratio > 1.0), "{found:?}");
