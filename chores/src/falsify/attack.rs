@@ -1,6 +1,6 @@
 //! The search for a start, inputs, disturbances and noise that break a certificate.
 
-use super::case::{Case, Role};
+use super::case::{Case, Noise, Role};
 use super::claims::Claim;
 use super::integrate::{Flow, Limits, follow};
 use super::pair::Pair;
@@ -48,9 +48,6 @@ pub struct Attack<'a> {
 /// Samples of a run at most, and different gaps between them.
 const SAMPLES: usize = 300;
 const GAPS: usize = 12;
-
-/// Standard deviations that noise stays within.
-const DEVIATIONS: f64 = 3.0;
 
 impl Attack<'_> {
     /// The worst plan of a search of about `runs` simulations, seen again at a
@@ -121,6 +118,22 @@ impl Attack<'_> {
         plan
     }
 
+    /// Everything that acts, from a start in the inner half of the box.
+    pub fn noisy(&self, numbers: &mut Numbers) -> Plan {
+        let mut plan = self.plan(numbers);
+        plan.quiet = false;
+        plan.plant.iter_mut().for_each(|x| *x = 0.25 + 0.5 * *x);
+        plan.inputs = self.signals(numbers, false);
+        plan.noise = self.errors(numbers, false);
+        plan
+    }
+
+    /// The standard deviation of each reading's noise, 0 where it is not Gaussian.
+    pub fn gaussian(&self) -> Vec<f64> {
+        let of = |noise: &Noise| if noise.is_uniform { 0.0 } else { noise.size };
+        self.case.noise.iter().map(of).collect()
+    }
+
     /// Near the middle of the box, with a small error and nothing that acts.
     pub fn rest(&self, numbers: &mut Numbers, error: f64) -> Plan {
         let n = self.pair.estimates();
@@ -153,9 +166,9 @@ impl Attack<'_> {
 
     fn errors(&self, numbers: &mut Numbers, quiet: bool) -> Vec<Signal> {
         let n = self.pair.estimates();
-        let of = |σ: &f64| match quiet || *σ == 0.0 {
+        let of = |noise: &Noise| match quiet || noise.size == 0.0 {
             true => Signal::Constant(0.0),
-            false => signals::free(numbers, [-DEVIATIONS * σ, DEVIATIONS * σ], n),
+            false => signals::free(numbers, [-noise.bound(), noise.bound()], n),
         };
         self.case.noise.iter().map(of).collect()
     }

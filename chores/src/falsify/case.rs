@@ -12,16 +12,19 @@ pub enum Kind {
     UnknownInput,
     /// a gain by linear matrix inequalities
     Designed,
+    /// an extended Kalman filter along a tube
+    Filter,
 }
 
 impl Kind {
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Triangular,
         Self::BlockTriangular,
         Self::StateAffine,
         Self::DriftObservable,
         Self::UnknownInput,
         Self::Designed,
+        Self::Filter,
     ];
 
     /// As the command and the tables have it.
@@ -33,6 +36,7 @@ impl Kind {
             Self::DriftObservable => "drift-observable",
             Self::UnknownInput => "unknown-input",
             Self::Designed => "lmi",
+            Self::Filter => "ekf",
         }
     }
 }
@@ -97,6 +101,55 @@ pub struct Asked {
     pub until: f64,
 }
 
+/// Errors of the readings of an output.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Noise {
+    /// standard deviation of Gaussian noise, bound of uniform noise; 0 for none
+    pub size: f64,
+    pub is_uniform: bool,
+}
+
+impl Noise {
+    /// What a certificate takes it to stay within.
+    pub fn bound(self) -> f64 {
+        match self.is_uniform {
+            true => self.size,
+            false => 3.0 * self.size,
+        }
+    }
+}
+
+/// A known input over time.
+#[derive(Clone, Debug)]
+pub struct Wave {
+    pub middle: f64,
+    pub amplitude: f64,
+    pub pace: f64,
+}
+
+impl Wave {
+    pub fn value(&self, t: f64) -> f64 {
+        self.middle + self.amplitude * (self.pace * t).sin()
+    }
+
+    fn text(&self) -> String {
+        let [middle, amplitude, pace] = [self.middle, self.amplitude, self.pace].map(number);
+        match self.amplitude == 0.0 {
+            true => middle,
+            false => format!("{middle} + {amplitude}*sin({pace}*time)"),
+        }
+    }
+}
+
+/// The run that a filter is followed along.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// from sample to sample
+    pub every: f64,
+    /// the known inputs by their names
+    pub known: Vec<(String, Wave)>,
+}
+
 #[derive(Clone, Debug)]
 pub struct Case {
     pub kind: Kind,
@@ -107,12 +160,16 @@ pub struct Case {
     /// empty where the derivatives are explicit
     pub couplings: Vec<Coupling>,
     pub outputs: Vec<Sum>,
-    /// standard deviation per output; 0 for none
-    pub noise: Vec<f64>,
+    /// per output
+    pub noise: Vec<Noise>,
+    /// densities of process noise, by states and unknown inputs
+    pub process: Vec<(String, f64)>,
     /// the bound of the known inputs' derivatives, where the study declares one
     pub slope: Option<f64>,
     /// what is asked about its tube
     pub tube: Option<Asked>,
+    /// of a filter
+    pub course: Option<Course>,
     /// key and value of `[observer]`
     pub observer: Vec<(String, String)>,
 }
@@ -191,11 +248,22 @@ impl Case {
                 _ = writeln!(text, "{key} = [{names}]");
             }
         }
-        let noise = self.noise.iter().enumerate().filter(|(_, σ)| **σ > 0.0);
-        let noise: Vec<String> = noise.map(|(i, σ)| format!("y{} = {σ:?}", i + 1)).collect();
+        let noise = self.noise.iter().enumerate().filter(|(_, n)| n.size > 0.0);
+        let noise = noise.map(|(i, Noise { size, is_uniform })| match is_uniform {
+            true => format!("y{} = {{ uniform = {size:?} }}", i + 1),
+            false => format!("y{} = {size:?}", i + 1),
+        });
+        let noise: Vec<String> = noise.collect();
         if !noise.is_empty() {
             _ = writeln!(text, "noise = {{ {} }}", noise.join(", "));
         }
+        if !self.process.is_empty() {
+            text += "\n[process_noise]\n";
+        }
+        for (name, density) in &self.process {
+            _ = writeln!(text, "{name} = {density:?}");
+        }
+        self.write_course(&mut text);
         text += "\n[observer]\n";
         for (key, value) in &self.observer {
             _ = writeln!(text, "{key} = {value}");
@@ -221,5 +289,28 @@ impl Case {
             );
         }
         text
+    }
+
+    /// What a filter is followed along: the study's own simulation.
+    fn write_course(&self, text: &mut String) {
+        let (Some(course), Some(asked)) = (&self.course, &self.tube) else {
+            return;
+        };
+        let (until, every) = (asked.until, course.every);
+        _ = writeln!(
+            text,
+            "\n[simulate]\nuntil = {until:?}\nsample_step = {every:?}\noutput_step = {every:?}"
+        );
+        let inputs = self.inputs.iter().map(|Input { side, .. }| {
+            let own = course.known.iter().find(|(name, _)| *name == side.name);
+            let value = own.map_or_else(|| number(side.middle()), |(_, wave)| wave.text());
+            format!("{} = {value:?}", side.name)
+        });
+        let inputs: Vec<String> = inputs.collect();
+        if !inputs.is_empty() {
+            _ = writeln!(text, "inputs = {{ {} }}", inputs.join(", "));
+        }
+        // a filter is compared with what is said of it in exact arithmetic
+        text.push_str("\n[estimate]\nrtol = 1e-11\natol = 1e-14\n");
     }
 }

@@ -1,13 +1,13 @@
 //! What the library says about a case: every claim that can be attacked. The only file
 //! that knows what certificates look like.
 
-use lynkeus::Tube;
 use lynkeus::observers::guarantee::Said;
 use lynkeus::observers::{
-    Certificate, Check, Examination, FAMILIES, Reason, Statement, Tuning, UltimateBound,
+    Bounds, Certificate, Check, Examination, FAMILIES, Reason, Statement, Tuning, UltimateBound,
 };
 use lynkeus::prepare::{Prepared, StudyDesign};
 use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
+use lynkeus::{FilterTube, Tube};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -24,6 +24,8 @@ pub struct Claim {
     pub ultimate: Option<f64>,
     /// the same per quantity
     pub each: Vec<UltimateBound>,
+    /// what the error is within in the end, at any one time with a probability
+    pub probable: Option<Bounds>,
     /// V = eᵀPe falls at 2·rate without disturbance and noise
     pub lyapunov: Option<DMatrix<f64>>,
     /// the box by names
@@ -48,6 +50,8 @@ pub struct Findings {
     pub sampled: Option<(Claim, f64, bool)>,
     /// where the plant is from the starts that the study asks about
     pub tube: Option<Tube>,
+    /// what is said of the filter's error from there
+    pub filter: Option<FilterTube>,
     pub refutations: Vec<Refutation>,
     /// the family that the study asks for
     pub examination: Option<Examination>,
@@ -92,12 +96,16 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
             overshoot: longest.overshoot,
             ultimate: None,
             each: vec![],
+            probable: None,
             lyapunov: Some(longest.lyapunov.clone()),
             sides: report.certificate.region.clone(),
         };
         Some((claim, longest.interval, sampled.together))
     });
     found.tube = report.tube;
+    found.filter = report.filter;
+    let filter = found.filter.as_ref().map(|f| f.verdict);
+    found.counts.proved += usize::from(filter == Some(Standing::Proved));
     found.certified(report.certificate, true);
     if let Some(theorem) = report.theorem {
         found.certified(theorem, false);
@@ -120,6 +128,7 @@ impl Findings {
             claims: vec![],
             sampled: None,
             tube: None,
+            filter: None,
             refutations: vec![],
             examination: examinations.ok().and_then(|all| all.last().cloned()),
             contradicts: false,
@@ -204,6 +213,7 @@ fn claim(certificate: &Certificate) -> Option<Claim> {
         overshoot: certificate.overshoot,
         ultimate: certificate.ultimate_bound,
         each: certificate.ultimate.clone(),
+        probable: certificate.probable.clone(),
         lyapunov: certificate.lyapunov.clone(),
         sides: certificate.region.clone(),
     })

@@ -1,16 +1,20 @@
 //! One case: what the library says of it, and what is wrong with that.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use lynkeus::Study;
+use lynkeus::expr::Budget;
 use lynkeus::observers::Observer;
 use lynkeus::prepare::Prepared;
 use lynkeus::structure::{AugmentedPlant, Standing, range};
 
 use super::attack::Attack;
 use super::case::{Case, Kind, Role};
+use super::chance;
 use super::claims::{self, Findings};
 use super::facts::{self, Fact, Facts};
+use super::filter;
 use super::pair::Pair;
 use super::refute;
 use super::retune;
@@ -31,6 +35,10 @@ pub enum Flaw {
     Contradiction,
     /// the gain that is printed is not the observer's
     Gain,
+    /// a filter's error or deviation leaves its tube
+    Filter,
+    /// too many runs are beyond a bound with a probability
+    Chance,
     /// a run leaves the tube, or the witness of one that leaves the box does not
     Tube,
     /// a witness that shows nothing
@@ -51,6 +59,8 @@ pub struct Violation {
 pub struct Effort {
     /// simulations per proof
     pub runs: usize,
+    /// quantities of a filter that are driven to their ends
+    pub targets: usize,
     /// conditions of all families instead of the study's
     pub thorough: bool,
     /// every family examines the plant; no observer is attacked
@@ -58,6 +68,9 @@ pub struct Effort {
     /// whether plant and gain are looked at beside the certificates
     pub facts: bool,
 }
+
+/// For the tube of a filter, which may be stiff or have many dimensions.
+const LONGEST: Duration = Duration::from_secs(4);
 
 /// A folder in which the case is written for the library to read.
 pub struct Desk(PathBuf);
@@ -95,7 +108,11 @@ pub fn judge(
     let mut case = case.clone();
     for round in 0..3 {
         let study = desk.write(&case).map_err(|e| e.to_string())?;
-        let study = Study::load(&study).map_err(|e| e.to_string())?;
+        let mut study = Study::load(&study).map_err(|e| e.to_string())?;
+        if case.kind == Kind::Filter {
+            // what is proved until then stands
+            study.budget = Budget::new(Some(LONGEST), None);
+        }
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
         let augmented = prepared.augmented();
@@ -115,9 +132,10 @@ pub fn judge(
             violations: vec![],
             counts: found.counts.clone(),
         };
-        looked.everything(numbers);
+        looked.everything(&study, numbers);
         let (counts, violations) = (looked.counts, looked.violations);
         let simulated = effort.facts && !effort.refutations_only;
+        let simulated = simulated && case.kind != Kind::Filter;
         if violations.is_empty() && simulated && found.fits() && numbers.chance(0.15) {
             let mut judgement = Judgement {
                 counts,
@@ -147,7 +165,7 @@ struct Look<'a, 'p> {
 }
 
 impl Look<'_, '_> {
-    fn everything(&mut self, numbers: &mut Numbers) {
+    fn everything(&mut self, study: &Study, numbers: &mut Numbers) {
         if self.effort.refutations_only {
             self.witnesses();
             self.counts.violated = usize::from(!self.violations.is_empty());
@@ -159,11 +177,19 @@ impl Look<'_, '_> {
                 "theorem proved, inequality refuted".into(),
             );
         }
-        if let Some(design) = &self.found.design {
+        let is_filter = self.case.kind == Kind::Filter;
+        if let Some(design) = self.found.design.as_ref().filter(|_| !is_filter) {
             self.against_claims(&design.observer, numbers);
+            self.against_chances(&design.observer, numbers);
             self.against_samples(&design.observer, numbers);
         }
         self.against_tube(numbers);
+        if is_filter {
+            self.against_filter(study, numbers);
+            self.witnesses();
+            self.counts.violated = usize::from(!self.violations.is_empty());
+            return;
+        }
         if self.effort.facts && self.found.fits() {
             self.against_facts(numbers);
         }
@@ -203,6 +229,63 @@ impl Look<'_, '_> {
         if worst.ratio > 1.0 + 1e-4 {
             let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);
             self.note(Flaw::Exceeded, evidence);
+        }
+    }
+
+    /// Runs with random noise, counted.
+    fn against_chances(&mut self, observer: &Observer, numbers: &mut Numbers) {
+        let found = self.found;
+        let all = found.claims.iter().enumerate();
+        let probable = all.filter_map(|(i, c)| Some((i, c.probable.as_ref()?)));
+        for (i, bounds) in probable {
+            let Ok(mut pair) = Pair::new(self.augmented.plant, self.augmented, observer) else {
+                return;
+            };
+            let claims = &found.claims[i..=i];
+            let mut attack = attack(self.case, self.augmented, &mut pair, claims);
+            let density = |v: &lynkeus::model::Variable| {
+                let own = self.case.process.iter().find(|(name, _)| *name == v.name);
+                own.map_or(0.0, |(_, density)| *density)
+            };
+            // noise on an unknown input moves none of the plant's states: it stays where it is
+            let states = &self.augmented.states[..self.augmented.plant_states()];
+            let densities: Vec<f64> = states.iter().map(density).collect();
+            let rate = found.claims[i].rate;
+            let Some(counted) = chance::count(&mut attack, bounds, rate, &densities, numbers)
+            else {
+                continue;
+            };
+            self.counts.probable += 1;
+            if let Some(evidence) = counted.evidence {
+                self.note(Flaw::Chance, evidence);
+            }
+        }
+    }
+
+    /// Runs of the study's own filter.
+    fn against_filter(&mut self, study: &Study, numbers: &mut Numbers) {
+        let Some(tube) = &self.found.filter else {
+            return;
+        };
+        let mut study = study.clone();
+        study.budget = Budget::default();
+        for is_exact in [false, true] {
+            let followed = if is_exact { &tube.exact } else { &tube.noisy };
+            let Some(followed) = followed.as_ref().filter(|f| f.reached > tube.from) else {
+                continue;
+            };
+            let attack = filter::Attack::new(self.case, &study, self.augmented, tube, is_exact);
+            let worst = match attack {
+                Ok(mut attack) => attack.search(numbers, self.effort.targets),
+                Err(missing) => return self.note(Flaw::Filter, missing),
+            };
+            if worst.is_whole && !is_exact {
+                self.counts.filters += 1;
+                self.counts.bounded += usize::from(followed.reached >= tube.until);
+            }
+            if worst.ratio > 1.0 {
+                self.note(Flaw::Filter, worst.what);
+            }
         }
     }
 

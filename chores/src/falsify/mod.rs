@@ -3,8 +3,10 @@
 
 mod attack;
 pub mod case;
+mod chance;
 mod claims;
 mod facts;
+mod filter;
 pub mod generate;
 mod instant;
 mod integrate;
@@ -60,6 +62,7 @@ const ROUND: &[Kind] = &[
     Kind::Designed,
     Kind::StateAffine,
     Kind::UnknownInput,
+    Kind::Filter,
 ];
 
 fn search(options: &Options) -> Result<Report, String> {

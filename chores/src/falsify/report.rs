@@ -62,6 +62,7 @@ impl Options {
         let enough = proved >= self.count;
         Effort {
             runs: 30,
+            targets: 4,
             thorough: enough || index.is_multiple_of(16),
             facts: true,
             refutations_only: enough,

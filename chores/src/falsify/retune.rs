@@ -49,7 +49,7 @@ pub fn raised(
                 _ => false,
             }
         }
-        Kind::Designed => false,
+        Kind::Designed | Kind::Filter => false,
     }
 }
 
@@ -178,6 +178,7 @@ pub fn diverges(
             overshoot: Some(peak * (8f64).exp()),
             ultimate: None,
             each: vec![],
+            probable: None,
             lyapunov: None,
             sides: vec![],
         };

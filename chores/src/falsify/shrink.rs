@@ -62,9 +62,9 @@ fn simpler(case: &Case) -> Vec<Case> {
                 cases.push(less);
             }
         }
-        if case.noise[i] > 0.0 {
+        if case.noise[i].size > 0.0 {
             let mut less = case.clone();
-            less.noise[i] = 0.0;
+            less.noise[i].size = 0.0;
             cases.push(less);
         }
     }
@@ -81,10 +81,15 @@ fn simpler(case: &Case) -> Vec<Case> {
             cases.push(less);
         }
     }
+    for i in 0..case.process.len() {
+        let mut less = case.clone();
+        less.process[i].1 = 0.0;
+        cases.extend((case.process[i].1 > 0.0).then_some(less));
+    }
     if let Some(tube) = &case.tube {
         let mut less = case.clone();
         less.tube = None;
-        cases.push(less);
+        cases.extend(case.course.is_none().then_some(less));
         for i in 0..tube.start.len() {
             let mut less = case.clone();
             if let Some(tube) = &mut less.tube {
@@ -94,7 +99,7 @@ fn simpler(case: &Case) -> Vec<Case> {
         }
     }
     for (key, _) in &case.observer {
-        if !["family", "theta", "poles", "gain", "rate"].contains(&key.as_str()) {
+        if !["family", "theta", "poles", "gain", "rate", "initial"].contains(&key.as_str()) {
             let mut less = case.clone();
             less.observer.retain(|(k, _)| k != key);
             cases.push(less);

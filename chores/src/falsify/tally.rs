@@ -28,6 +28,11 @@ pub struct Counts {
     /// tubes that were attacked, and those of them that stay in the box
     pub tubes: usize,
     pub stay: usize,
+    /// filters' tubes that were attacked, and those of them that are proved to their end
+    pub filters: usize,
+    pub bounded: usize,
+    /// bounds with a probability of which runs were counted
+    pub probable: usize,
     /// cases with a violation
     pub violated: usize,
     /// refutations re-evaluated, and those found wrong
@@ -53,6 +58,9 @@ impl Counts {
         self.sampled_together += other.sampled_together;
         self.tubes += other.tubes;
         self.stay += other.stay;
+        self.filters += other.filters;
+        self.bounded += other.bounded;
+        self.probable += other.probable;
         self.violated += other.violated;
         self.refutations += other.refutations;
         self.wrong += other.wrong;
@@ -77,8 +85,8 @@ impl Tally {
 
     /// A table in Markdown.
     pub fn table(&self) -> String {
-        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | samples together | tubes | that stay | violated | witnesses checked | wrong |\n\
-                        |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
+        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | samples together | tubes | that stay | filters | to their end | in probability | violated | witnesses checked | wrong |\n\
+                        |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
         let rows = self.0.iter().map(|(kind, counts)| (kind.word(), counts));
         let total = self.total();
@@ -96,6 +104,9 @@ impl Tally {
                 c.sampled_together,
                 c.tubes,
                 c.stay,
+                c.filters,
+                c.bounded,
+                c.probable,
                 c.violated,
                 c.refutations,
                 c.wrong,

@@ -3,7 +3,8 @@
 
 use nalgebra::DMatrix;
 
-use super::case::{Asked, Case, Input, Kind, Role, Side};
+use super::case::{Asked, Case, Course, Input, Kind, Noise, Role, Side};
+use super::chance::Counted;
 use super::claims::Claim;
 use super::facts::{Fact, Facts};
 use super::judge::{Desk, attack};
@@ -13,7 +14,7 @@ use crate::numbers::Numbers;
 use lynkeus::expr::Interval;
 use lynkeus::prepare::Prepared;
 use lynkeus::structure::Standing;
-use lynkeus::{Study, Tube, Witness};
+use lynkeus::{FilterTube, Study, Tube, Witness};
 
 fn side(name: &str, low: f64, high: f64) -> Side {
     Side {
@@ -39,9 +40,11 @@ fn case(term: &str) -> Case {
         ],
         couplings: vec![],
         outputs: vec![vec!["x1".into(), "d".into()]],
-        noise: vec![0.0],
+        noise: vec![Noise::default()],
+        process: vec![],
         slope: None,
         tube: None,
+        course: None,
         observer: vec![],
     };
     case.key("family", "\"triangular\"");
@@ -75,6 +78,7 @@ fn claim(rate: f64, overshoot: f64, ultimate: f64) -> Claim {
         overshoot: Some(overshoot),
         ultimate: Some(ultimate),
         each: vec![],
+        probable: None,
         lyapunov: None,
         sides: vec![],
     }
@@ -216,6 +220,107 @@ fn a_witness_that_shows_nothing_is_found() {
     }
 }
 
+/// What is seen of runs of a pendulum's filter, beside its tube with other numbers in it.
+fn filtered(name: &str, change: impl FnOnce(&mut FilterTube)) -> f64 {
+    let mut case = case("-sin(x1) + d");
+    case.kind = Kind::Filter;
+    case.outputs = vec![vec!["x1".into()]];
+    case.noise[0] = Noise {
+        size: 0.004,
+        is_uniform: true,
+    };
+    case.process = vec![("x1".into(), 0.0), ("x2".into(), 0.02)];
+    case.tube = Some(Asked {
+        start: vec![side("x1", 0.4, 0.44), side("x2", -0.02, 0.02)],
+        until: 1.5,
+    });
+    case.course = Some(Course {
+        every: 0.15,
+        known: vec![],
+    });
+    case.observer.clear();
+    case.key("family", "\"ekf\"");
+    case.key("initial", "{ x1 = 0.42, x2 = 0 }");
+    case.key("initial_variance", "{ x1 = 0.001, x2 = 0.001 }");
+    let folder = std::env::temp_dir().join(format!("lynkeus-{name}-{}", std::process::id()));
+    let desk = Desk::new(&folder).unwrap();
+    let study = Study::load(desk.write(&case).unwrap()).unwrap();
+    let plant = lynkeus::prepare::plant(&study).unwrap();
+    let prepared = Prepared::new(&study, &plant).unwrap();
+    let mut tube = lynkeus::certify(&study).unwrap().filter.unwrap();
+    assert_eq!(tube.verdict, Standing::Proved);
+    change(&mut tube);
+    let mut attack =
+        super::filter::Attack::new(&case, &study, prepared.augmented(), &tube, false).unwrap();
+    let worst = attack.search(&mut Numbers::new(5, 0), 6);
+    std::fs::remove_dir_all(folder).unwrap();
+    assert!(worst.is_whole || worst.ratio > 1.0);
+    worst.ratio
+}
+
+/// A tenth less of a range, about its middle.
+fn tenth_less(range: &mut Interval) {
+    let (middle, half) = (range.midpoint(), 0.45 * range.width());
+    *range = Interval::new(middle - half, middle + half).unwrap();
+}
+
+#[test]
+fn runs_of_a_filter_leave_a_tube_that_is_too_narrow() {
+    let ratio = filtered("filter", |_| {});
+    assert!(ratio <= 1.0 && ratio > 0.97, "{ratio}");
+    let end = |tube: &mut FilterTube| {
+        let noisy = tube.noisy.as_mut().unwrap();
+        noisy.error_end.iter_mut().for_each(tenth_less);
+    };
+    let rows = |tube: &mut FilterTube| {
+        let noisy = tube.noisy.as_mut().unwrap();
+        let rows = noisy.rows[135..165].iter_mut();
+        rows.for_each(|row| row.2[..2].iter_mut().for_each(narrower));
+    };
+    let deviation = |tube: &mut FilterTube| {
+        let noisy = tube.noisy.as_mut().unwrap();
+        for range in &mut noisy.deviation_end {
+            *range = Interval::new(1.0005 * range.hi(), 1.01 * range.hi()).unwrap();
+        }
+    };
+    let found = [
+        filtered("end", end),
+        filtered("rows", rows),
+        filtered("sd", deviation),
+    ];
+    assert!(found.iter().all(|ratio| *ratio > 1.0), "{found:?}");
+}
+
+/// e' = −(0.5 + k) e + k ν: the error is normal, and as large as the bound says but for the mean of a tail instead of its
+/// quantile, 2.892 instead of 2.576 standard deviations.
+#[test]
+fn too_many_runs_beyond_a_bound_are_counted() {
+    let mut case = case("0");
+    case.states = vec![side("x1", -1.0, 1.0)];
+    case.equations = vec![vec!["-0.5*x1".into()]];
+    case.outputs = vec![vec!["x1".into()]];
+    case.inputs.clear();
+    case.noise[0].size = 0.02;
+    case.key("theta", "2");
+    let count = |share: f64| {
+        with_pair(&case, "chance", |pair, augmented| {
+            let study = std::env::temp_dir().join(format!(
+                "lynkeus-falsify-chance-{}/study.toml",
+                std::process::id()
+            ));
+            let report = lynkeus::certify(&Study::load(study).unwrap()).unwrap();
+            let mut bounds = report.certificate.probable.unwrap();
+            bounds.norm *= share;
+            bounds.states.iter_mut().for_each(|b| b.value *= share);
+            let rate = report.certificate.rate.unwrap();
+            let mut attack = attack(&case, augmented, pair, &[]);
+            super::chance::count(&mut attack, &bounds, rate, &[], &mut Numbers::new(5, 0))
+        })
+    };
+    assert!(matches!(count(1.0), Some(Counted { evidence: None })));
+    assert!(matches!(count(0.8), Some(Counted { evidence: Some(_) })));
+}
+
 /// The same search as `cargo xtask falsify`, short.
 #[test]
 fn a_short_search_finds_no_false_claim() {
@@ -243,6 +348,7 @@ fn a_short_search_finds_no_false_claim() {
         "{total:?}"
     );
     assert!(total.refutations as u64 > PLANTS / 30, "{total:?}");
+    assert!(total.bounded > 0 && total.probable > 0, "{total:?}");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -150,7 +150,10 @@ impl<'a> Attack<'a> {
         let side = &input.side;
         let constant = self.tube.constants.iter().find(|(n, _)| *n == side.name);
         let Some((_, range)) = constant else {
-            return signals::free(numbers, [side.low, side.high], self.case.states.len());
+            // a study with a simulation may ask about its inputs alone
+            let own = self.tube.inputs.iter().find(|(n, _)| *n == side.name);
+            let own = own.map_or([side.low, side.high], |(_, range)| [range.lo(), range.hi()]);
+            return signals::free(numbers, own, self.case.states.len());
         };
         Signal::Constant(match numbers.below(3) {
             0 => range.lo(),

@@ -1,6 +1,6 @@
 //! The forms that the families take, filled with random terms.
 
-use super::super::case::{Case, Input, Kind, Role, Side, Sum, number};
+use super::super::case::{Case, Input, Kind, Noise, Role, Side, Sum, number};
 use super::terms::{Reads, round};
 use super::{Draft, sides_of};
 
@@ -26,7 +26,7 @@ impl Draft<'_> {
 
     /// One chain of states per sensor.
     pub fn chains(&mut self, kind: Kind, several: bool) -> Case {
-        let one: &[&[usize]] = &[&[2], &[2], &[2], &[3], &[3], &[4], &[1, 1], &[2, 1]];
+        let one: &[&[usize]] = &[&[1], &[2], &[2], &[2], &[3], &[3], &[4], &[1, 1], &[2, 1]];
         let many: &[&[usize]] = &[
             &[1, 1],
             &[2, 1],
@@ -88,6 +88,28 @@ impl Draft<'_> {
             declared: self.numbers.chance(0.85),
         };
         (input, format!("{a}*v"))
+    }
+
+    /// A small plant for a filter, now and then with a pole far from the others.
+    pub fn followed(&mut self) -> Case {
+        let several = self.numbers.chance(0.3);
+        let most = if self.numbers.chance(0.2) { 3 } else { 2 };
+        let mut case = self.free();
+        if self.numbers.chance(0.6) {
+            case = self.chains(Kind::Filter, several);
+        }
+        while case.states.len() > most {
+            case = self.chains(Kind::Filter, several);
+        }
+        case.kind = Kind::Filter;
+        if self.numbers.chance(0.25) {
+            let place = self.numbers.below(case.states.len());
+            let k = number(round(-self.numbers.size(5.0, 60.0)));
+            let side = &case.states[place];
+            let term = format!("{k}*({} - {})", side.name, number(side.middle()));
+            case.equations[place].push(term);
+        }
+        case
     }
 
     /// Blocks that read the next one through a matrix.
@@ -229,7 +251,8 @@ fn case(
 ) -> Case {
     Case {
         kind,
-        noise: vec![0.0; outputs.len()],
+        noise: vec![Noise::default(); outputs.len()],
+        process: vec![],
         states,
         inputs,
         equations,
@@ -237,6 +260,7 @@ fn case(
         outputs,
         slope: None,
         tube: None,
+        course: None,
         observer: vec![],
     }
 }

@@ -22,14 +22,18 @@ pub fn case(numbers: &mut Numbers, kind: Kind) -> Case {
         Kind::StateAffine => draft.blocks(),
         Kind::DriftObservable => draft.free(),
         Kind::UnknownInput => draft.layers(),
+        Kind::Filter => draft.followed(),
     };
     draft.unmeasured(&mut case);
     draft.hostile(&mut case);
     draft.implicit(&mut case);
-    settings::choose(draft.numbers, &mut case);
-    if draft.numbers.chance(TUBES) {
-        case.tube = Some(asked(draft.numbers, &case));
+    let is_filter = kind == Kind::Filter;
+    if is_filter || draft.numbers.chance(TUBES) {
+        // a filter's tube has many more dimensions
+        let most = if is_filter { (0.1, 2.0) } else { (0.4, 8.0) };
+        case.tube = Some(asked(draft.numbers, &case, most));
     }
+    settings::choose(draft.numbers, &mut case);
     case
 }
 
@@ -38,8 +42,8 @@ const TUBES: f64 = 0.3;
 
 /// Where the plant may start, about the middle of the box, and for how long: unknown constants where they are declared,
 /// or in a part of that.
-fn asked(numbers: &mut Numbers, case: &Case) -> Asked {
-    let share = numbers.size(1e-3, 0.4);
+fn asked(numbers: &mut Numbers, case: &Case, (widest, latest): (f64, f64)) -> Asked {
+    let share = numbers.size(1e-3, widest);
     let is_constant = |input: &&Input| input.role == Role::Unknown(None) && input.declared;
     let constants = case.inputs.iter().filter(is_constant).map(|i| &i.side);
     let constants: Vec<&Side> = constants.filter(|_| numbers.chance(0.5)).collect();
@@ -59,7 +63,7 @@ fn asked(numbers: &mut Numbers, case: &Case) -> Asked {
     let start = case.states.iter().chain(constants).map(&mut part).collect();
     Asked {
         start,
-        until: round(numbers.size(0.1, 8.0)),
+        until: round(numbers.size(0.1, latest)),
     }
 }
 
@@ -219,9 +223,19 @@ impl<'n> Draft<'n> {
                 declared,
             });
         }
-        for σ in &mut case.noise {
-            if self.numbers.chance(0.15) {
-                *σ = self.numbers.size(1e-4, 1e-2);
+        for noise in &mut case.noise {
+            if self.numbers.chance(0.3) {
+                noise.size = self.numbers.size(1e-4, 1e-2);
+                noise.is_uniform = self.numbers.chance(0.2);
+            }
+        }
+        // no bound for certain is left then
+        if self.numbers.chance(0.08) {
+            let unknown = |i: &&Input| matches!(i.role, Role::Unknown(_));
+            let unknown = case.inputs.iter().filter(unknown).map(|i| &i.side);
+            for side in case.states.iter().chain(unknown) {
+                let density = self.numbers.size(1e-8, 1e-3) * side.width().powi(2);
+                case.process.push((side.name.clone(), round(density)));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Settings of `[observer]` for random plants.
 
-use super::super::case::{Case, Kind, Role};
+use super::super::case::{Case, Course, Input, Kind, Noise, Role, Side, Wave};
 use super::terms::round;
 use crate::numbers::Numbers;
 
@@ -12,6 +12,7 @@ pub fn choose(numbers: &mut Numbers, case: &mut Case) {
         Kind::StateAffine => state_affine(numbers, case),
         Kind::DriftObservable => drift_observable(numbers, case),
         Kind::UnknownInput => unknown_input(numbers, case),
+        Kind::Filter => filter(numbers, case),
     }
 }
 
@@ -114,4 +115,71 @@ fn unknown_input(numbers: &mut Numbers, case: &mut Case) {
             format!("[{:?}, {:?}]", round(first), round(second)),
         );
     }
+}
+
+/// What a filter knows, and the run along which it is followed.
+fn filter(numbers: &mut Numbers, case: &mut Case) {
+    family(case, "ekf");
+    let Some(asked) = case.tube.clone() else {
+        return;
+    };
+    let unknown = |i: &&Input| matches!(i.role, Role::Unknown(_));
+    let unknown = case.inputs.iter().filter(unknown).map(|i| i.side.clone());
+    let sides: Vec<Side> = case.states.iter().cloned().chain(unknown).collect();
+    let idle = numbers.chance(0.4);
+    let (mut initial, mut variance) = (vec![], vec![]);
+    case.process.clear();
+    for Side { name, .. } in &sides {
+        let own = asked.start.iter().find(|start| start.name == *name);
+        let own = own.or_else(|| sides.iter().find(|side| side.name == *name));
+        let Some(own) = own else { continue };
+        let wide = sides
+            .iter()
+            .find(|s| s.name == *name)
+            .map_or(1.0, Side::width);
+        // in the start set or beside it
+        let off = numbers.between(-0.6, 0.6) * own.width();
+        let start = round(f64::midpoint(own.low, own.high) + off);
+        initial.push(format!("{name} = {start:?}"));
+        let share = numbers.size(0.3, 3.0) * (own.width() + 0.01 * wide);
+        variance.push(format!("{name} = {:?}", round(share * share)));
+        let density = match idle || numbers.chance(0.3) {
+            true => 0.0,
+            false => round(numbers.size(1e-5, 1e-2) * wide * wide),
+        };
+        case.process.push((name.clone(), density));
+    }
+    case.key("initial", format!("{{ {} }}", initial.join(", ")));
+    case.key("initial_variance", format!("{{ {} }}", variance.join(", ")));
+    let width = case.states[0].width();
+    for noise in &mut case.noise {
+        *noise = Noise {
+            size: round(numbers.size(3e-5, 1e-2) * width),
+            is_uniform: numbers.chance(0.5),
+        };
+    }
+    let count = numbers.between(3.0, 16.0).floor();
+    let known = case.inputs.iter().filter(|i| i.role == Role::Known);
+    let known = known.map(|input| {
+        let Side { name, low, high } = &input.side;
+        let middle = round(numbers.between(*low, *high));
+        let most = (high - middle).min(middle - low).max(0.0);
+        let amplitude = match numbers.chance(0.4) {
+            true => 0.0,
+            false => round(0.9 * most * numbers.unit()),
+        };
+        let pace = round(numbers.size(0.2, 10.0));
+        (
+            name.clone(),
+            Wave {
+                middle,
+                amplitude,
+                pace,
+            },
+        )
+    });
+    case.course = Some(Course {
+        known: known.collect(),
+        every: round(asked.until / count),
+    });
 }

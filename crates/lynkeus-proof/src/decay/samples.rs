@@ -9,7 +9,7 @@ use lynkeus_expr::{Budget, Interval};
 
 use super::check::falls_at_samples;
 use super::sampled::{longest_by, unit};
-use super::together::{Covered, FIRST_PARTS, Field, Form, PARTS, covered, first_points};
+use super::together::{Cover, Covered, FIRST_PARTS, Field, Form, PARTS, first_points};
 use super::{ErrorModel, SampledProof, between_errors, prove_between_samples};
 use crate::matrix::{points, product, square};
 
@@ -63,12 +63,14 @@ fn all_covered(
     let count = proof.P.len() - 1;
     let length = Interval::point(proof.interval) / Interval::point(count as f64);
     let mut parts = 0;
+    // the forms are alike, and so are the parts that they need
+    let mut cover = Cover::new(field);
     for ends in proof.P.windows(2) {
         let [from, to] = [&ends[0], &ends[1]].map(points);
         let change = square(from.len(), |i, j| (to[i][j] - from[i][j]) / length);
         for P in ends {
             let form = Form::changing(P, &change, proof.rate);
-            match covered(field, form, left, budget) {
+            match cover.by(form, left, budget) {
                 Covered::By(more) => parts += more,
                 other => return other,
             }

@@ -74,43 +74,105 @@ pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &B
 }
 
 /// The same of a form that may change, with so many parts left to examine.
-pub(super) fn covered(
-    field: &Field<'_>,
-    form: Option<Form>,
-    left: &mut usize,
-    budget: &Budget,
-) -> Covered {
-    let Some(form) = form else {
-        return Covered::Not(middle(&field.sides));
-    };
-    let mut open = vec![field.sides.clone()];
-    let mut parts = 0;
-    let least = left.saturating_sub(PARTS);
-    while let Some(part) = open.pop() {
-        if *left == least || budget.spent().is_some() {
-            return Covered::Unknown;
-        }
-        *left -= 1;
-        if form.falls(&(field.on)(&part)) {
-            parts += 1;
-            continue;
-        }
-        let point = middle(&part);
-        let center = (field.on)(&points_of(&point));
-        if !form.falls(&center) {
-            return Covered::Not(point);
-        }
-        let along = field.slopes.map(|slopes| slopes(&part));
-        if along.is_some_and(|along| form.falls_along(&center, &along, &part)) {
-            parts += 1;
-            continue;
-        }
-        match form.halves(field, &part) {
-            Some(halves) => open.extend(halves),
-            None => return Covered::Not(point),
+fn covered(field: &Field<'_>, form: Option<Form>, left: &mut usize, budget: &Budget) -> Covered {
+    Cover::new(field).by(form, left, budget)
+}
+
+/// A box in parts: those that one form needed, from which another one goes on.
+pub(super) struct Cover<'a> {
+    field: &'a Field<'a>,
+    parts: Vec<Part>,
+}
+
+/// A part of a box with A on it, as far as it was asked about.
+struct Part {
+    sides: Vec<Interval>,
+    whole: Option<IntervalMatrix>,
+    center: Option<IntervalMatrix>,
+    along: Option<Vec<IntervalMatrix>>,
+    /// whether the last form fell there for its tangent plane, and not for all of its range
+    by_plane: bool,
+}
+
+impl Part {
+    fn new(sides: Vec<Interval>) -> Self {
+        Self {
+            sides,
+            whole: None,
+            center: None,
+            along: None,
+            by_plane: false,
         }
     }
-    Covered::By(parts)
+
+    fn falls(&mut self, form: &Form, field: &Field<'_>) -> bool {
+        form.falls(self.whole.get_or_insert_with(|| (field.on)(&self.sides)))
+    }
+
+    fn center(&mut self, field: &Field<'_>) -> &IntervalMatrix {
+        let sides = &self.sides;
+        self.center
+            .get_or_insert_with(|| (field.on)(&points_of(&middle(sides))))
+    }
+
+    fn falls_along(&mut self, form: &Form, field: &Field<'_>) -> bool {
+        let Some(slopes) = field.slopes else {
+            return false;
+        };
+        self.center(field);
+        let along = self.along.get_or_insert_with(|| slopes(&self.sides));
+        let center = self.center.as_ref();
+        center.is_some_and(|center| form.falls_along(center, along, &self.sides))
+    }
+}
+
+impl<'a> Cover<'a> {
+    pub fn new(field: &'a Field<'a>) -> Self {
+        Self {
+            field,
+            parts: vec![Part::new(field.sides.clone())],
+        }
+    }
+
+    /// Whether a form falls everywhere, with so many parts left to examine. Where it does not, there is no telling what
+    /// is left of the cover.
+    pub fn by(&mut self, form: Option<Form>, left: &mut usize, budget: &Budget) -> Covered {
+        let field = self.field;
+        let Some(form) = form else {
+            return Covered::Not(middle(&field.sides));
+        };
+        let mut open = std::mem::take(&mut self.parts);
+        let least = left.saturating_sub(PARTS);
+        while let Some(mut part) = open.pop() {
+            if *left == least || budget.spent().is_some() {
+                return Covered::Unknown;
+            }
+            *left -= 1;
+            let was_by_plane = part.by_plane;
+            if was_by_plane && part.falls_along(&form, field) {
+                self.parts.push(part);
+                continue;
+            }
+            part.by_plane = false;
+            if part.falls(&form, field) {
+                self.parts.push(part);
+                continue;
+            }
+            if !form.falls(part.center(field)) {
+                return Covered::Not(middle(&part.sides));
+            }
+            if !was_by_plane && part.falls_along(&form, field) {
+                part.by_plane = true;
+                self.parts.push(part);
+                continue;
+            }
+            match form.halves(field, &part.sides) {
+                Some(halves) => open.extend(halves.map(Part::new)),
+                None => return Covered::Not(middle(&part.sides)),
+            }
+        }
+        Covered::By(self.parts.len())
+    }
 }
 
 fn middle(part: &[Interval]) -> Vec<f64> {
@@ -119,6 +181,15 @@ fn middle(part: &[Interval]) -> Vec<f64> {
 
 fn points_of(point: &[f64]) -> Vec<Interval> {
     point.iter().map(|&x| Interval::point(x)).collect()
+}
+
+/// Adds a row so many times.
+fn add(sums: &mut [Interval], times: Interval, row: &[Interval]) {
+    for (sum, entry) in sums.iter_mut().zip(row) {
+        if *entry != Interval::ZERO {
+            *sum = *sum + times * *entry;
+        }
+    }
 }
 
 /// P' + He(P A) + 2·rate·P in axes T in which P is about the unit: for an invertible T it is negative definite there
@@ -161,18 +232,41 @@ impl Form {
         })
     }
 
-    /// The lower triangle of −He(TᵀPAT) less another form.
-    fn lower(&self, A: &IntervalMatrix, less: &IntervalMatrix) -> IntervalMatrix {
+    /// The lower triangle of −He(TᵀPAT) less another form. Entries that are 0 count for nothing: what has no value
+    /// anywhere in A comes with an entry of either diagonal, and none of these is 0.
+    fn lower(&self, A: &IntervalMatrix, less: Option<&IntervalMatrix>) -> IntervalMatrix {
         let [left, right] = &self.sides;
-        let middle = product(&product(left, A), right);
-        let entry = |i: usize, j: usize| -(middle[i][j] + middle[j][i] + less[i][j]);
-        let row = |i: usize| (0..=i).map(|j| entry(i, j)).collect();
-        (0..middle.len()).map(row).collect()
+        let n = A.len();
+        let of = |i: usize, j: usize| less.map_or(Interval::ZERO, |less| -less[i][j]);
+        let mut lower: IntervalMatrix = (0..n)
+            .map(|i| (0..=i).map(|j| of(i, j)).collect())
+            .collect();
+        let mut along = vec![Interval::ZERO; n];
+        for (i, weights) in left.iter().enumerate() {
+            along.fill(Interval::ZERO);
+            for (weight, row) in weights.iter().zip(A) {
+                add(&mut along, *weight, row);
+            }
+            for (middle, row) in along.iter().zip(right) {
+                if *middle == Interval::ZERO {
+                    continue;
+                }
+                for (j, entry) in row.iter().enumerate().filter(|e| *e.1 != Interval::ZERO) {
+                    let term = *middle * *entry;
+                    let at = &mut lower[i.max(j)][i.min(j)];
+                    *at = *at - term;
+                    if i == j {
+                        *at = *at - term;
+                    }
+                }
+            }
+        }
+        lower
     }
 
     /// Whether it is negative definite for every A between these.
     fn falls(&self, A: &IntervalMatrix) -> bool {
-        is_positive_definite(&self.lower(A, &self.decay))
+        is_positive_definite(&self.lower(A, Some(&self.decay)))
     }
 
     /// Whether it is so for every A on a part, from A in its middle and A's derivatives on all of it:
@@ -204,6 +298,9 @@ impl Form {
             for i in 0..n {
                 for j in 0..n {
                     let slope = slopes[k][i][j];
+                    if slope == Interval::ZERO {
+                        continue;
+                    }
                     let own = match ends.contains(&k) {
                         true => slope - Interval::point(slope.midpoint()),
                         false => slope,
@@ -212,13 +309,12 @@ impl Form {
                 }
             }
         }
-        let whole = self.lower(&rest, &self.decay);
-        let still = square(n, |_, _| Interval::ZERO);
+        let whole = self.lower(&rest, Some(&self.decay));
         let along: Vec<(Interval, IntervalMatrix)> = ends
             .iter()
             .map(|&k| {
                 let plane = square(n, |i, j| Interval::point(slopes[k][i][j].midpoint()));
-                (around(&part[k]), self.lower(&plane, &still))
+                (around(&part[k]), self.lower(&plane, None))
             })
             .collect();
         (0..1_usize << along.len()).all(|choice| {
@@ -230,9 +326,7 @@ impl Form {
                     δ.hi()
                 });
                 for (row, plane) in rows.iter_mut().zip(plane) {
-                    for (entry, slope) in row.iter_mut().zip(plane) {
-                        *entry = *entry + end * *slope;
-                    }
+                    add(row, end, plane);
                 }
             }
             is_positive_definite(&rows)

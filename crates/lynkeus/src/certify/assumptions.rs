@@ -52,16 +52,6 @@ pub(super) fn of(
         .map_err(explain)
 }
 
-/// Bounds of the errors of readings, one per measured output.
-pub(super) fn readings(
-    prepared: &Prepared<'_>,
-    augmented: &AugmentedPlant<'_>,
-) -> Result<Vec<f64>, Error> {
-    let region = augmented.region();
-    let errors = errors(prepared.declared(), augmented.plant, augmented, &region)?;
-    Ok(errors.iter().map(ReadingError::bound).collect())
-}
-
 /// Per augmented state: what disturbances within their declared ranges add to its
 /// derivative; for an unknown input the bound of its rate of change.
 fn drift(

@@ -32,7 +32,7 @@ pub struct FilterTube {
     pub start: Ranges,
     /// where the estimate starts
     pub estimate: Vec<(String, f64)>,
-    /// bounds of the errors of readings, by output
+    /// bounds of the noise of readings, by output
     pub readings: Vec<(String, f64)>,
     /// ranges of what may vary as it likes
     pub inputs: Ranges,

@@ -13,14 +13,13 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, Graph, Interval, Node, Tape, jacobian};
 use lynkeus_model::{Home, Variable};
-use lynkeus_observers::Observer;
+use lynkeus_observers::{Observer, ReadingError};
 use lynkeus_proof::tube::{Problem, Sampled};
 use lynkeus_run::Level;
 use lynkeus_run::filter::FilterKind;
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_study::{BetweenSamples, Name, Noise};
 
-use super::super::assumptions;
 use super::super::tube::{bounded, first_of, refuse_others, side};
 use crate::Error;
 use lynkeus_experiment::course::filter::noise;
@@ -128,20 +127,30 @@ impl System {
         let estimate: Vec<f64> = observer.states.iter().map(|(_, start)| *start).collect();
         let tape =
             |inputs: &[Node], outputs: &[Node]| Tape::new(graph, inputs, outputs).map_err(explain);
+        let ranges = bounded(prepared, &inputs)?;
+        let (shown, mut errors) = (model.shown(), readings(prepared.declared(), augmented));
+        // what disturbs an output is at the sample wherever the plant is then, in the box or not
+        let read = graph.symbols_of(&shown);
+        let disturbed = inputs.iter().zip(&ranges);
+        let disturbed = disturbed.filter(|(v, _)| read.contains(&v.node));
+        let (disturbed, sizes): (Vec<Node>, Vec<f64>) = disturbed
+            .map(|(v, range)| (v.node, range.magnitude()))
+            .unzip();
+        errors.extend(sizes);
         let sampled = Sampled {
             flow: Problem {
                 right: tape(&with(&nodes), &right)?,
                 from,
                 start: starts(prepared, augmented, start)?,
                 constants: vec![],
-                inputs: bounded(prepared, &inputs)?,
+                inputs: ranges,
             },
             first: tape(
                 &symbols.x,
                 &model.first(&estimate, variance, (plant.time, from)),
             )?,
-            sample: tape(&with(&symbols.errors), &sample)?,
-            errors: assumptions::readings(prepared, augmented)?,
+            sample: tape(&with(&[&symbols.errors[..], &disturbed].concat()), &sample)?,
+            errors,
             times: (0..=count as usize)
                 .map(|k| from + k as f64 * every)
                 .collect(),
@@ -301,6 +310,23 @@ fn variances(declared: &Declared, augmented: &AugmentedPlant<'_>) -> Vec<f64> {
         .iter()
         .map(|o| of(&o.variable.name))
         .collect()
+}
+
+/// Bounds of the noise of readings, one per measured output.
+fn readings(declared: &Declared, augmented: &AugmentedPlant<'_>) -> Vec<f64> {
+    let of = |name: &str| match declared.noise.of(name) {
+        Some(Noise::Absolute(deviation)) => ReadingError {
+            deviation: *deviation,
+            ..ReadingError::default()
+        },
+        Some(Noise::Uniform(uniform)) => ReadingError {
+            uniform: *uniform,
+            ..ReadingError::default()
+        },
+        _ => ReadingError::default(),
+    };
+    let outputs = augmented.outputs.iter();
+    outputs.map(|o| of(&o.variable.name).bound()).collect()
 }
 
 /// The place of Pᵢⱼ in the lower triangle.
@@ -492,6 +518,17 @@ impl<'g> Model<'_, 'g> {
         all
     }
 
+    /// h as the plant has it, disturbances included.
+    fn shown(&self) -> Vec<Node> {
+        let own = |output: &Variable| {
+            let all = &self.augmented.plant.outputs;
+            let found = all.iter().find(|o| o.name == output.name);
+            found.map_or(output.node, |o| o.node)
+        };
+        let outputs = self.augmented.outputs.iter();
+        outputs.map(|o| own(&o.variable)).collect()
+    }
+
     /// z⁺, for the variances R.
     fn sample(&self, noises: &[f64]) -> Vec<Node> {
         let n = self.symbols.x.len();
@@ -502,13 +539,7 @@ impl<'g> Model<'_, 'g> {
             .map_or(&[][..], |f| &f.outputs);
         let predicted = self.put(outputs);
         let slopes = self.slopes(outputs, |nodes| self.put(nodes));
-        let seen: Vec<Node> = self
-            .augmented
-            .outputs
-            .iter()
-            .map(|o| o.variable.node)
-            .collect();
-        let seen = self.put(&seen);
+        let seen = self.put(&self.shown());
         let before = self.exprs(&self.symbols.e);
         let (mut e, mut P) = (before.clone(), self.exprs(&self.symbols.P));
         let zero = self.graph.constant(0.0);
