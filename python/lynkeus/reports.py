@@ -731,7 +731,7 @@ class FilterTube(Record):
     noisy: FollowedEntry | None
     """with these errors of readings"""
     exact: FollowedEntry | None
-    """with readings that are exact: what the start alone leaves"""
+    """with readings without noise: what the start and disturbances leave"""
     obstacle: str | None
     """why it is not proved"""
     notes: list[str]

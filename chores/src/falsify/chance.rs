@@ -76,12 +76,19 @@ pub fn count(
         densities,
     };
     let mut worst: Option<(usize, Choice)> = None;
+    let mut ended = 0;
     for _ in 0..PLANS {
         let choice = counter.choice(numbers);
-        let most = counter.beyond(&choice, RUNS, numbers).into_iter().max()?;
+        let (counts, whole) = counter.beyond(&choice, RUNS, numbers);
+        ended += whole;
+        let most = counts.into_iter().max()?;
         if worst.as_ref().is_none_or(|(count, _)| most > *count) {
             worst = Some((most, choice));
         }
+    }
+    // runs that leave the box, or need too many steps, say nothing
+    if ended < PLANS * RUNS / 2 {
+        return None;
     }
     let (most, choice) = worst?;
     let share = 1.0 - PROBABILITY;
@@ -126,7 +133,7 @@ impl Counter<'_, '_> {
         let looks = (PARTS.len() * self.limits.len()) as f64;
         let (mut runs, mut counts) = (0, vec![0; self.limits.len()]);
         for part in PARTS {
-            let more = self.beyond(choice, part - runs, numbers);
+            let (more, _) = self.beyond(choice, part - runs, numbers);
             counts
                 .iter_mut()
                 .zip(more)
@@ -148,19 +155,26 @@ impl Counter<'_, '_> {
 
     /// In how many of so many runs each quantity is beyond its bound at their end. One that leaves the box, where
     /// nothing is claimed of slopes, counts for none.
-    fn beyond(&mut self, choice: &Choice, runs: usize, numbers: &mut Numbers) -> Vec<usize> {
+    fn beyond(
+        &mut self,
+        choice: &Choice,
+        runs: usize,
+        numbers: &mut Numbers,
+    ) -> (Vec<usize>, usize) {
         let mut counts = vec![0; self.limits.len()];
+        let mut ended = 0;
         for _ in 0..runs {
             let Some(error) = self.run(choice, numbers) else {
                 continue;
             };
+            ended += 1;
             let norm = error.iter().map(|e| e * e).sum::<f64>().sqrt();
             let sizes = error.iter().map(|e| e.abs()).chain([norm]);
             for ((count, size), limit) in counts.iter_mut().zip(sizes).zip(self.limits) {
                 *count += usize::from(size > limit * (1.0 + 1e-6));
             }
         }
-        counts
+        (counts, ended)
     }
 
     /// The error at the end of a run that starts without one.

@@ -54,8 +54,6 @@ pub struct Attack<'a> {
     places: Vec<usize>,
     /// half the range of the reading's error, per output
     errors: Vec<f64>,
-    /// whether readings are what the filter expects of the plant's state: no disturbance moves them
-    is_exact: bool,
     scale: Vec<f64>,
     /// all of them, and those that are followed
     samples: Vec<f64>,
@@ -160,7 +158,6 @@ impl<'a> Attack<'a> {
             signals,
             places,
             errors: outputs.iter().map(error).collect(),
-            is_exact,
             scale: augmented.states.iter().map(width).collect(),
             times: samples.iter().copied().filter(counts).collect(),
             samples,
@@ -285,10 +282,7 @@ impl<'a> Attack<'a> {
             let choices = &rest[k * self.per_sample()..(k + 1) * self.per_sample()];
             let ranges = self.tube.inputs.iter().cycle();
             let moved = choices[errors..].iter().zip(ranges);
-            let mut moved: Vec<f64> = moved.map(|(s, (_, range))| within(*s, range)).collect();
-            if self.is_exact {
-                moved[..varying].fill(0.0);
-            }
+            let moved: Vec<f64> = moved.map(|(s, (_, range))| within(*s, range)).collect();
             let signals = self.read(t, &x, &moved[..varying], &choices[..errors]);
             if estimator.push(t, &signals).is_err() {
                 return seen;

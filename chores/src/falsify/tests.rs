@@ -352,5 +352,5 @@ fn a_short_search_finds_no_false_claim() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// About half a minute in a debug build.
+/// One or two minutes.
 const PLANTS: u64 = 120;

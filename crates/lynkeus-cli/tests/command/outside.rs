@@ -143,7 +143,11 @@ fn an_estimate_that_runs_away_is_an_answer_no_with_its_table() {
         "{}",
         ended.err
     );
-    assert!(ended.err.contains("try another `theta`"), "{}", ended.err);
+    assert!(
+        ended.err.contains("try another (`lynkeus tune`)"),
+        "{}",
+        ended.err
+    );
     let json = ended.json();
     assert_eq!(json["credible"], false);
     assert!(json["final"]["z"].as_f64().unwrap().abs() > 1e6, "{json}");

@@ -69,7 +69,7 @@ impl Kind {
     pub(crate) fn hint(self) -> &'static str {
         match self {
             Self::Range => {
-                "compare units, columns and the model with the log, see whether `lynkeus certify` proves this tuning, try another (`lynkeus tune`); if the plant really goes there, declare a wider min and max (the result is still written)"
+                "see whether `lynkeus certify` proves this tuning, try another (`lynkeus tune`), compare units, columns and the model with the log; if the plant really goes there, declare a wider min and max (the result is still written)"
             }
             Self::Frozen => {
                 "repair the sensor, or declare its range (`limits` of [sensors]) if that is what its readings show (the result is still written)"

@@ -1,5 +1,7 @@
 //! Usual changes of a log's column: another unit, a factor of ten, the other sign.
 
+use lynkeus_model::Variable;
+
 use crate::Series;
 
 /// A usual change of a reading y: factor·y + offset.
@@ -12,8 +14,8 @@ pub(crate) struct Change {
     pub cause: &'static str,
 }
 
-/// Of so many readings of all it is asked.
-const NEARLY_ALL: f64 = 0.9;
+/// A share of readings that leaves out a few that are wrong by themselves.
+pub(crate) const NEARLY_ALL: f64 = 0.9;
 
 const fn change(factor: f64, offset: f64, expression: &'static str, cause: &'static str) -> Change {
     Change {
@@ -74,6 +76,11 @@ impl Change {
         self.offset == 0.0 && self.factor > 0.0
     }
 
+    /// Whether it moves the zero, as those of temperatures do.
+    fn is_of_temperatures(&self) -> bool {
+        self.offset != 0.0
+    }
+
     /// What a reading is then.
     pub fn at(&self, y: f64) -> f64 {
         self.factor * y + self.offset
@@ -85,16 +92,23 @@ impl Change {
     }
 }
 
-/// The change with which nearly all readings lie within a range; none where several do that.
-pub(crate) fn within(range: [f64; 2], readings: &Series) -> Option<&'static Change> {
+/// The change with which nearly all readings of a variable lie in its declared range; none where several do that. Only a
+/// temperature, or what has no declared unit, may be another temperature.
+pub(crate) fn within(declared: &Variable, readings: &Series) -> Option<&'static Change> {
+    let unit = declared.unit.as_deref();
     let fits = |change: &&Change| {
-        let values = readings.iter().map(|y| change.at(y));
-        let known = values.filter(|y| y.is_finite());
+        let may_be = match unit {
+            Some("K" | "degC" | "degF") => change.is_of_temperatures(),
+            Some(_) => !change.is_of_temperatures(),
+            None => true,
+        };
+        let known = readings.iter().map(|y| change.at(y));
+        let known = known.filter(|y| y.is_finite());
         let (inside, all) = known.fold((0, 0), |(inside, all): (usize, usize), y| {
-            let is_inside = range[0] <= y && y <= range[1];
+            let is_inside = declared.min <= y && y <= declared.max;
             (inside + usize::from(is_inside), all + 1)
         });
-        all > 0 && inside as f64 >= NEARLY_ALL * all as f64
+        may_be && all > 0 && inside as f64 >= NEARLY_ALL * all as f64
     };
     let mut found = CHANGES.iter().filter(fits);
     let first = found.next();
@@ -103,18 +117,33 @@ pub(crate) fn within(range: [f64; 2], readings: &Series) -> Option<&'static Chan
 
 #[cfg(test)]
 mod tests {
+    use lynkeus_model::{LoadOptions, Plant};
+
     use super::*;
 
     #[test]
     fn a_range_tells_the_only_unit_in_which_readings_lie_in_it() {
-        let cause = |range, readings: &[f64]| {
-            within(range, &readings.to_vec().into()).map(|change| change.cause)
+        let of = |[min, max]: [f64; 2], unit: Option<&str>, readings: &[f64]| {
+            let unit = unit.map_or_else(String::new, |unit| format!(", unit = \"{unit}\""));
+            let model = format!(
+                "model M Real x(min = {min}, max = {max}{unit}); equation der(x) = -x; end M;"
+            );
+            let plant = Plant::from_modelica(&model, "m.mo", &LoadOptions::default()).unwrap();
+            within(&plant.states[0], &readings.to_vec().into()).map(|change| change.cause)
         };
+        let cause = |range, readings: &[f64]| of(range, None, readings);
         let kelvin = [280.0, 380.0];
         let found = cause(kelvin, &[31.0, 58.0, f64::NAN, 44.0]);
         assert_eq!(found, Some("in °C beside a model in kelvin"));
         // 300 to 340 as ten times as much, too
         assert_eq!(cause(kelvin, &[30.0, 34.0]), None);
+        let found = of(kelvin, Some("K"), &[30.0, 34.0]);
+        assert_eq!(found, Some("in °C beside a model in kelvin"));
+        let celsius = [0.0, 100.0];
+        assert_eq!(cause(celsius, &[300.0]), None);
+        let found = of(celsius, Some("degC"), &[300.0]);
+        assert_eq!(found, Some("in kelvin beside a model in °C"));
+        assert_eq!(of(celsius, Some("m"), &[300.0]), None);
         assert_eq!(cause(kelvin, &[1e6]), None);
         assert_eq!(cause(kelvin, &[]), None);
         let bar = cause([0.5, 3.0], &[1e5, 2.2e5]);

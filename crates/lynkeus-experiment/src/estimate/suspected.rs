@@ -16,7 +16,7 @@ use crate::course::run::start_at_readings;
 use crate::course::units::{CHANGES, Change};
 use crate::course::{Course, Samples};
 use crate::estimate::followed::followed;
-use crate::prepare::headers::header;
+use crate::prepare::headers::header_in_expressions;
 use crate::prepare::systems::run_settings;
 use crate::prepare::{Prepared, StudyDesign};
 
@@ -162,14 +162,7 @@ impl Trial<'_, '_> {
     /// The name of a sensor, and its column as an expression has it.
     fn names(&self, sensor: usize) -> (String, String) {
         let name = &self.design.observer.measured[sensor].name;
-        let own = header(&self.prepared.study().estimate, name);
-        let is_name = own.chars().all(|c| c.is_alphanumeric() || c == '_');
-        let is_expression = own.contains(['+', '-', '*', '/', '^', '(', '\'']);
-        let own = match (is_name, is_expression) {
-            (true, _) => own.to_owned(),
-            (false, true) => format!("({own})"),
-            (false, false) => format!("'{own}'"),
-        };
+        let own = header_in_expressions(&self.prepared.study().estimate, name);
         (name.clone(), own)
     }
 }

@@ -1,6 +1,7 @@
 //! What a run knows of itself.
 
 use lynkeus_model::Variable;
+use lynkeus_study::EstimateSettings;
 
 use super::Judged;
 use crate::{Frozen, Quantity, Series};
@@ -9,6 +10,8 @@ use crate::{Frozen, Quantity, Series};
 pub(crate) struct Evidence<'e> {
     pub time: &'e Series,
     pub quantities: &'e [Quantity],
+    /// where the log has what
+    pub settings: &'e EstimateSettings,
     /// what is declared of everything estimated
     pub declared: Vec<&'e Variable>,
     /// standard deviations of quantities by name, whether or not they are told

@@ -555,6 +555,7 @@ impl Sight<'_> {
         judge::doubts(&Evidence {
             time: self.time,
             quantities: self.quantities,
+            settings: &self.prepared.study().estimate,
             declared: declared.chain(&plant.inputs).collect(),
             deviations: told.chain(kept).collect(),
             sensors: sensors.collect(),

@@ -5,8 +5,9 @@ use lynkeus_words::figures;
 
 use super::Evidence;
 use crate::course::doubt::{Doubt, Kind, Level};
-use crate::course::units::within;
+use crate::course::units::{NEARLY_ALL, within};
 use crate::judge::outside::percent;
+use crate::prepare::headers::header_in_expressions;
 use crate::words::{instant, number, side};
 use crate::{Quantity, Series};
 
@@ -72,14 +73,18 @@ struct Away {
 pub(super) fn doubts(evidence: &Evidence<'_>) -> Vec<Doubt> {
     let mut away = away(&evidence.declared, evidence.quantities);
     away.sort_by(|a, b| b.widths.total_cmp(&a.widths));
-    let mut found: Vec<Doubt> = away.iter().map(Away::doubt).collect();
+    // readings that are elsewhere altogether take estimates with them
+    let quantities = evidence.quantities.iter();
+    let doubted = quantities.filter_map(|quantity| misread(evidence, quantity));
+    let (mut found, others): (Vec<_>, Vec<_>) =
+        doubted.partition(|doubt| doubt.level == Level::Refusal);
+    found.extend(away.iter().map(Away::doubt));
     for quantity in evidence.quantities {
-        let is_known = |d: &Doubt| d.name == quantity.name;
-        if !found.iter().any(is_known) {
+        if !away.iter().any(|away| away.name == quantity.name) {
             found.extend(beyond(evidence, quantity));
-            found.extend(misread(evidence, quantity));
         }
     }
+    found.extend(others);
     found
 }
 
@@ -326,9 +331,6 @@ fn readings_beyond<'e>(
     (width.is_finite() && width > 0.0).then(|| readings.map(beyond))
 }
 
-/// Readings that are nearly all outside by more than the range itself are in another unit, or the range is wrong.
-const NEARLY_ALL: f64 = 0.9;
-
 /// A sensor whose readings are mostly outside of what is declared.
 fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
     let (mut count, mut far, mut rows, mut farthest) = (0, 0, 0_usize, 0.0_f64);
@@ -338,6 +340,7 @@ fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
         far += usize::from(beyond > 1.0);
         farthest = farthest.max(beyond);
     }
+    // another unit, or the range is wrong
     let is_elsewhere = rows > 0 && far as f64 >= NEARLY_ALL * rows as f64;
     let name = quantity.sensor.as_ref().unwrap_or(&quantity.name);
     let range = match &quantity.sensor {
@@ -346,10 +349,11 @@ fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
     };
     let unit = || {
         let declared = evidence.declared.iter().find(|v| v.name == quantity.name)?;
-        let change = within([declared.min, declared.max], quantity.measured.as_ref()?)?;
-        let (cause, changed) = (change.cause, change.expression.replace("{}", name));
+        let change = within(declared, quantity.measured.as_ref()?)?;
+        let header = header_in_expressions(evidence.settings, name);
+        let (cause, changed) = (change.cause, change.expression.replace("{}", &header));
         Some(format!(
-            "they look as if they were {cause}, and lie in it as {changed} (columns of [log])"
+            "they look as if they were {cause}, and lie in it where `columns = {{ {name} = \"{changed}\" }}` stands in [log]"
         ))
     };
     (2 * count > rows).then(|| Doubt {

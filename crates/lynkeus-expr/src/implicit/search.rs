@@ -53,8 +53,13 @@ impl Implicit {
             pairs.join(", ")
         };
         let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+        // where g jumps over zero, what is left of it may be small
+        let sides = match self.0.sides {
+            Some(_) => ", and no root was found on a side where its own conditions hold",
+            None => "",
+        };
         format!(
-            "Newton's method from {} ends at {} with a residual of {worst:.3e}; the equations may \
+            "Newton's method from {} ends at {} with a residual of {worst:.3e}{sides}; the equations may \
              have no solution in the declared range there, or need another `start`",
             named(self.start()),
             named(end),

@@ -75,16 +75,24 @@ pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &B
 
 /// The same of a form that may change, with so many parts left to examine.
 fn covered(field: &Field<'_>, form: Option<Form>, left: &mut usize, budget: &Budget) -> Covered {
-    Cover::new(field).by(form, left, budget)
+    let mut cover = Cover::new(field);
+    // no other form follows
+    cover.room = 0;
+    cover.by(form, left, budget)
 }
+
+/// Entries of matrices that the parts of a cover keep together: some 50 MB.
+const ROOM: usize = 2_000_000;
 
 /// A box in parts: those that one form needed, from which another one goes on.
 pub(super) struct Cover<'a> {
     field: &'a Field<'a>,
     parts: Vec<Part>,
+    /// entries that these may still keep
+    room: usize,
 }
 
-/// A part of a box with A on it, as far as it was asked about.
+/// A part of a box with A on it, as far as it was asked about and there is room.
 struct Part {
     sides: Vec<Interval>,
     whole: Option<IntervalMatrix>,
@@ -103,6 +111,12 @@ impl Part {
             along: None,
             by_plane: false,
         }
+    }
+
+    fn entries(&self) -> usize {
+        let matrices = self.whole.iter().chain(&self.center);
+        let matrices = matrices.chain(self.along.iter().flatten());
+        matrices.map(|matrix| matrix.len() * matrix.len()).sum()
     }
 
     fn falls(&mut self, form: &Form, field: &Field<'_>) -> bool {
@@ -131,7 +145,22 @@ impl<'a> Cover<'a> {
         Self {
             field,
             parts: vec![Part::new(field.sides.clone())],
+            room: ROOM,
         }
+    }
+
+    /// Keeps a part on which a form fell, with what decided that.
+    fn keep(&mut self, mut part: Part) {
+        if part.by_plane {
+            part.whole = None;
+        } else {
+            (part.center, part.along) = (None, None);
+        }
+        match self.room.checked_sub(part.entries()) {
+            Some(left) => self.room = left,
+            None => (part.whole, part.center, part.along) = (None, None, None),
+        }
+        self.parts.push(part);
     }
 
     /// Whether a form falls everywhere, with so many parts left to examine. Where it does not, there is no telling what
@@ -148,14 +177,15 @@ impl<'a> Cover<'a> {
                 return Covered::Unknown;
             }
             *left -= 1;
+            self.room += part.entries();
             let was_by_plane = part.by_plane;
             if was_by_plane && part.falls_along(&form, field) {
-                self.parts.push(part);
+                self.keep(part);
                 continue;
             }
             part.by_plane = false;
             if part.falls(&form, field) {
-                self.parts.push(part);
+                self.keep(part);
                 continue;
             }
             if !form.falls(part.center(field)) {
@@ -163,7 +193,7 @@ impl<'a> Cover<'a> {
             }
             if !was_by_plane && part.falls_along(&form, field) {
                 part.by_plane = true;
-                self.parts.push(part);
+                self.keep(part);
                 continue;
             }
             match form.halves(field, &part.sides) {

@@ -38,7 +38,7 @@ pub struct FilterTube {
     pub inputs: Ranges,
     /// with these errors of readings; none where nothing could be followed
     pub noisy: Option<Followed>,
-    /// with readings that are exact: what the start alone leaves
+    /// with readings without noise: what the start and disturbances leave
     pub exact: Option<Followed>,
     /// why it is not proved
     pub obstacle: Option<String>,
@@ -132,7 +132,8 @@ impl FilterTube {
         }
         self.noisy = Some(noisy);
         let mut exact = system.sampled.clone();
-        exact.errors.fill(0.0);
+        // after the noise of each output stands what disturbs them, which stays
+        exact.errors[..system.outputs.len()].fill(0.0);
         self.exact = Some(self.followed(system, &exact, &budget.part(0.5)));
     }
 

@@ -81,9 +81,10 @@ fn folder(plant: &str, study: &str) -> Folder {
 
 fn filter(folder: &Folder) -> Value {
     let ended = folder.run(&["certify", "study.toml", "--json"]);
-    // 1 where the plant does not stay in its box
-    assert!(ended.code < 2, "{ended:?}");
-    ended.json()["certificate"]["filter"].clone()
+    let found = ended.json()["certificate"].clone();
+    let leaves = found["tube"]["verdict"] == "refuted";
+    assert_eq!(ended.code, i32::from(leaves), "{ended:?}");
+    found["filter"].clone()
 }
 
 /// The hull of what rows have at a time.
@@ -237,7 +238,8 @@ start = { x = [0.99, 1] }
 ";
     let seen = attacked(plant, study, &[("x", [0.99, 1.0])], &["x"]);
     assert!(
-        seen.error > 0.8 && seen.exact > 100.0,
+        // without noise all of it is left
+        seen.error > 0.8 && (0.8..1.2).contains(&seen.exact),
         "{} {}",
         seen.error,
         seen.exact

@@ -226,6 +226,10 @@ fn a_run_that_a_limit_ended_goes_on() {
         let limited = [&ARGUMENTS[..], &["--time-limit", &seconds]].concat();
         if folder.run(&limited).code == 3 {
             rows.push(folder.read("e.csv").lines().count());
+            if rows.ends_with(&[rows[rows.len() - 1]; 2]) {
+                // too busy a machine to come to another record in that time
+                limit *= 2.0;
+            }
             assert!(rows.len() < 100, "{rows:?}");
         } else if rows.is_empty() {
             // the time was that of a busier machine

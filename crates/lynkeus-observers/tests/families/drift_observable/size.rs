@@ -62,7 +62,7 @@ fn a_map_that_is_too_large_is_not_begun() {
     // n² products of the cube's series alone, with n slopes each
     assert!(operations > 400 * 400 * 400, "{operations}");
     assert!(
-        begun.elapsed() < Duration::from_secs(5),
+        begun.elapsed() < Duration::from_secs(20),
         "{:?}",
         begun.elapsed()
     );

@@ -82,7 +82,7 @@ impl FilterTube {
             format!("filter's own sd until {reached}"),
             format!("at {reached}"),
         ];
-        head.extend(exact.map(|_| format!("error at {reached} if readings were exact")));
+        head.extend(exact.map(|_| format!("error at {reached} without noise")));
         let row = |(i, (name, _)): (usize, &(String, Interval))| {
             let mut row = vec![
                 name.clone(),
@@ -121,7 +121,7 @@ pub(crate) struct FilterEntry {
     inputs: Named<Range>,
     /// with these errors of readings
     noisy: Option<FollowedEntry>,
-    /// with readings that are exact: what the start alone leaves
+    /// with readings without noise: what the start and disturbances leave
     exact: Option<FollowedEntry>,
     /// why it is not proved
     obstacle: Option<String>,
