@@ -52,6 +52,10 @@ const PATIENCE: u32 = 200;
 /// Largest tape whose step is made one function: it has four times the instructions.
 pub(crate) const LARGEST_STEP: usize = 50_000;
 
+/// Largest tape whose steps run as one loop of machine code: four times the instructions of a larger one leave the
+/// first caches, and its stages run faster one by one (`BENCHMARKS.md`, growth).
+const LARGEST_LOOP: usize = 1_500;
+
 /// Some expressions of a system as functions of its first inputs, with the code that was made of
 /// them, shared by all that run it.
 #[derive(Debug)]
@@ -126,6 +130,10 @@ impl Routine {
 
     fn of_step(&self) -> Option<&Tape> {
         let make = || {
+            // fused operations belong to the step
+            if self.tape.len() > LARGEST_LOOP && !is_fused() {
+                return None;
+            }
             let graph = self.equations.graph();
             let (inputs, next) = self.step_in(&graph)?;
             Steps::tape(&graph, &inputs, &next, is_fused()).ok()
