@@ -30,6 +30,17 @@ pub(crate) fn names(text: &str) -> Vec<String> {
     names
 }
 
+/// What a study has of a column, header or expression, within another expression.
+pub(crate) fn within_expression(text: &str) -> String {
+    let names = names(text);
+    match names.first() {
+        Some(name) if name == text => text.to_owned(),
+        Some(_) => format!("({text})"),
+        // what is no expression is a header: `T (degC)`
+        None => format!("'{text}'"),
+    }
+}
+
 /// A text over the headers of a log.
 struct Parsed {
     graph: Graph,
@@ -153,4 +164,23 @@ fn absent(table: &Table, text: &str, why: &str) -> Error {
         list(table.names())
     ))
     .hint("in an expression, headers that are no names of Modelica stand in single quotes: \"('T degF' - 32)/1.8\"")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::within_expression;
+
+    #[test]
+    fn a_header_that_is_no_name_is_quoted_within_an_expression() {
+        for (text, within) in [
+            ("T", "T"),
+            ("T degC", "'T degC'"),
+            ("T (degC)", "'T (degC)'"),
+            ("flow m3/h", "'flow m3/h'"),
+            ("T - 273.15", "(T - 273.15)"),
+            ("'T degF' - 32", "('T degF' - 32)"),
+        ] {
+            assert_eq!(within_expression(text), within);
+        }
+    }
 }

@@ -10,13 +10,14 @@ use std::time::Instant;
 use lynkeus_run::filter::SensorHealth;
 
 use crate::Series;
+use crate::course::computed::within_expression;
 use crate::course::doubt::{Doubt, Kind, Level};
 use crate::course::replay::Watch;
 use crate::course::run::start_at_readings;
 use crate::course::units::{CHANGES, Change};
 use crate::course::{Course, Samples};
 use crate::estimate::followed::followed;
-use crate::prepare::headers::header_in_expressions;
+use crate::prepare::headers::header;
 use crate::prepare::systems::run_settings;
 use crate::prepare::{Prepared, StudyDesign};
 
@@ -162,7 +163,7 @@ impl Trial<'_, '_> {
     /// The name of a sensor, and its column as an expression has it.
     fn names(&self, sensor: usize) -> (String, String) {
         let name = &self.design.observer.measured[sensor].name;
-        let own = header_in_expressions(&self.prepared.study().estimate, name);
+        let own = within_expression(header(&self.prepared.study().estimate, name));
         (name.clone(), own)
     }
 }

@@ -4,10 +4,11 @@ use lynkeus_model::Variable;
 use lynkeus_words::figures;
 
 use super::Evidence;
+use crate::course::computed::within_expression;
 use crate::course::doubt::{Doubt, Kind, Level};
 use crate::course::units::{NEARLY_ALL, within};
 use crate::judge::outside::percent;
-use crate::prepare::headers::header_in_expressions;
+use crate::prepare::headers::header;
 use crate::words::{instant, number, side};
 use crate::{Quantity, Series};
 
@@ -350,7 +351,7 @@ fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
     let unit = || {
         let declared = evidence.declared.iter().find(|v| v.name == quantity.name)?;
         let change = within(declared, quantity.measured.as_ref()?)?;
-        let header = header_in_expressions(evidence.settings, name);
+        let header = within_expression(header(evidence.settings, name));
         let (cause, changed) = (change.cause, change.expression.replace("{}", &header));
         Some(format!(
             "they look as if they were {cause}, and lie in it where `columns = {{ {name} = \"{changed}\" }}` stands in [log]"

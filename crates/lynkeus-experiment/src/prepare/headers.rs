@@ -177,18 +177,6 @@ pub fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
     given.map_or(name, |(_, header)| header.text.as_str())
 }
 
-/// The same as an expression of headers has it.
-pub(crate) fn header_in_expressions(settings: &EstimateSettings, name: &str) -> String {
-    let own = header(settings, name);
-    let is_name = own.chars().all(|c| c.is_alphanumeric() || c == '_');
-    let is_expression = own.contains(['+', '-', '*', '/', '^', '(', '\'']);
-    match (is_name, is_expression) {
-        (true, _) => own.to_owned(),
-        (false, true) => format!("({own})"),
-        (false, false) => format!("'{own}'"),
-    }
-}
-
 /// Refuses headers under which the study looks for what the plant does not have.
 pub(crate) fn refuse_stray_columns(
     plant: &Plant,

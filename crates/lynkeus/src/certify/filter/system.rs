@@ -13,13 +13,14 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, Graph, Interval, Node, Tape, jacobian};
 use lynkeus_model::{Home, Variable};
-use lynkeus_observers::{Observer, ReadingError};
+use lynkeus_observers::Observer;
 use lynkeus_proof::tube::{Problem, Sampled};
 use lynkeus_run::Level;
 use lynkeus_run::filter::FilterKind;
 use lynkeus_structure::AugmentedPlant;
 use lynkeus_study::{BetweenSamples, Name, Noise};
 
+use super::super::assumptions;
 use super::super::tube::{bounded, first_of, refuse_others, side};
 use crate::Error;
 use lynkeus_experiment::course::filter::noise;
@@ -128,7 +129,7 @@ impl System {
         let tape =
             |inputs: &[Node], outputs: &[Node]| Tape::new(graph, inputs, outputs).map_err(explain);
         let ranges = bounded(prepared, &inputs)?;
-        let (shown, mut errors) = (model.shown(), readings(prepared.declared(), augmented));
+        let (shown, mut errors) = (model.shown(), assumptions::noises(prepared, augmented)?);
         // what disturbs an output is at the sample wherever the plant is then, in the box or not
         let read = graph.symbols_of(&shown);
         let disturbed = inputs.iter().zip(&ranges);
@@ -224,8 +225,12 @@ fn excluded(
     });
     if let Some(output) = unread {
         let name = &output.variable.name;
+        let what = match noise.of(name) {
+            Some(Noise::Relative(_)) => "a share of its value, which the tube does not follow",
+            _ => "no number above 0",
+        };
         return Some(format!(
-            "the noise of {name} is no number above 0: noise = {{ {name} = … }} under [sensors]"
+            "the noise of {name} is {what}: noise = {{ {name} = … }} under [sensors], in its unit"
         ));
     }
     let curved = augmented.states.iter().any(|v| v.home != Home::Line);
@@ -310,23 +315,6 @@ fn variances(declared: &Declared, augmented: &AugmentedPlant<'_>) -> Vec<f64> {
         .iter()
         .map(|o| of(&o.variable.name))
         .collect()
-}
-
-/// Bounds of the noise of readings, one per measured output.
-fn readings(declared: &Declared, augmented: &AugmentedPlant<'_>) -> Vec<f64> {
-    let of = |name: &str| match declared.noise.of(name) {
-        Some(Noise::Absolute(deviation)) => ReadingError {
-            deviation: *deviation,
-            ..ReadingError::default()
-        },
-        Some(Noise::Uniform(uniform)) => ReadingError {
-            uniform: *uniform,
-            ..ReadingError::default()
-        },
-        _ => ReadingError::default(),
-    };
-    let outputs = augmented.outputs.iter();
-    outputs.map(|o| of(&o.variable.name).bound()).collect()
 }
 
 /// The place of Pᵢⱼ in the lower triangle.
