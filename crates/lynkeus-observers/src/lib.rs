@@ -17,6 +17,7 @@ mod conditions;
 mod design;
 pub mod drift_observable;
 mod estimate;
+mod field;
 mod generator;
 pub mod guarantee;
 pub mod kalman;

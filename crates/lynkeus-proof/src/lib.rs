@@ -46,6 +46,7 @@ pub mod chain;
 pub mod decay;
 pub mod definite;
 pub mod elimination;
+pub mod ellipsoid;
 pub mod hurwitz;
 pub mod inverse;
 mod lmi;

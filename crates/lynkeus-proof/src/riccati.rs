@@ -10,11 +10,10 @@ use lynkeus_expr::Interval;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector};
 
-use crate::definite::{is_below, is_positive_definite};
+use crate::definite::is_positive_definite;
+use crate::ellipsoid::Ellipsoid;
 use crate::lyapunov;
-use crate::magnitude::{length, size};
 use crate::matrix::{dot, points, square};
-use crate::spectrum;
 
 /// Newton steps; convergence is quadratic.
 const STEPS: usize = 40;
@@ -24,115 +23,57 @@ const HALVINGS: usize = 40;
 const SLACK: f64 = 1e-12;
 const SHARE: f64 = 1e-10;
 
-/// A solution P with bounds of what proofs need of it.
-#[derive(Clone, Debug)]
-pub struct Riccati {
-    /// P
-    pub P: DMatrix<f64>,
-    /// α
-    pub α: f64,
-    /// an upper bound of ‖P‖
-    pub largest: f64,
-    /// a lower bound of the smallest eigenvalue of P
-    pub smallest: f64,
-}
-
 /// The largest entry of A that is looked at.
 const LARGEST: f64 = 1e100;
 
-impl Riccati {
-    /// A proved solution of the inequality; none where none was found.
-    ///
-    /// ```
-    /// use lynkeus_proof::riccati::Riccati;
-    ///
-    /// // −2·3 P + 1 + 2·0.5 P + 4 P² ≤ 0 has solutions, with 3 in place of 0.5 none
-    /// let one = |x: f64| nalgebra::DMatrix::from_element(1, 1, x);
-    /// let found = Riccati::solve(&one(-3.0), &one(1.0), 0.5, 2.0).unwrap();
-    /// let P = found.P[0];
-    /// assert!(-6.0 * P + 1.0 + P + 4.0 * P * P <= 0.0);
-    /// assert!(Riccati::solve(&one(-3.0), &one(1.0), 3.0, 2.0).is_none());
-    /// ```
-    pub fn solve(A: &DMatrix<f64>, E: &DMatrix<f64>, α: f64, γ: f64) -> Option<Self> {
-        // e = D e', D of powers of two, so that fast poles leave nothing of very
-        // different size; scaling back is exact
-        let mut A = A.clone();
-        // squares that overflow would keep the balancing going for ever
-        if !A.iter().all(|a| a.abs() < LARGEST) {
-            return None;
-        }
-        let D = balance_parlett_reinsch(&mut A);
-        let n = A.nrows();
-        let E = DMatrix::from_fn(n, E.ncols(), |i, j| E[(i, j)] / D[i]);
-        let M = DMatrix::from_diagonal(&D.map(|d| (d * γ) * (d * γ)));
-        let shifted = &A + DMatrix::identity(n, n) * α;
-        let P = newton(&shifted, &raised(&shifted, &E)?, &M)?;
-        if !holds(&A, &E, α, (γ, &D), &P) {
-            return None;
-        }
-        let P = DMatrix::from_fn(n, n, |i, j| D[i] * P[(i, j)] * D[j]);
-        let inverse = P.clone().cholesky()?.inverse();
-        let top = |P: &DMatrix<f64>| Some(spectrum::symmetric(P.clone())?.eigenvalues.max());
-        let unit = DMatrix::identity(n, n);
-        let (largest, smallest) = (top(&P)? * (1.0 + 1e-6), (1.0 - 1e-3) / top(&inverse)?);
-        let bounded = is_below(&P, 1.0, &(&unit * largest)) && is_below(&unit, smallest, &P);
-        if !(bounded && smallest > 0.0) {
-            return None;
-        }
-        Some(Self {
-            α,
-            largest,
-            smallest,
-            P,
-        })
+/// A proved solution of the inequality; none where none was found.
+///
+/// ```
+/// use lynkeus_proof::riccati::solve;
+///
+/// // −2·3 P + 1 + 2·0.5 P + 4 P² ≤ 0 has solutions, with 3 in place of 0.5 none
+/// let one = |x: f64| nalgebra::DMatrix::from_element(1, 1, x);
+/// let found = solve(&one(-3.0), &one(1.0), 0.5, 2.0).unwrap();
+/// let P = found.P[0];
+/// assert!(-6.0 * P + 1.0 + P + 4.0 * P * P <= 0.0);
+/// assert!(solve(&one(-3.0), &one(1.0), 3.0, 2.0).is_none());
+/// ```
+pub fn solve(A: &DMatrix<f64>, E: &DMatrix<f64>, α: f64, γ: f64) -> Option<Ellipsoid> {
+    // e = D e', D of powers of two, so that fast poles leave nothing of very
+    // different size; scaling back is exact
+    let mut A = A.clone();
+    // squares that overflow would keep the balancing going for ever
+    if !A.iter().all(|a| a.abs() < LARGEST) {
+        return None;
     }
+    let D = balance_parlett_reinsch(&mut A);
+    let n = A.nrows();
+    let E = DMatrix::from_fn(n, E.ncols(), |i, j| E[(i, j)] / D[i]);
+    let M = DMatrix::from_diagonal(&D.map(|d| (d * γ) * (d * γ)));
+    let shifted = &A + DMatrix::identity(n, n) * α;
+    let P = newton(&shifted, &raised(&shifted, &E)?, &M)?;
+    if !holds(&A, &E, α, (γ, &D), &P) {
+        return None;
+    }
+    let P = DMatrix::from_fn(n, n, |i, j| D[i] * P[(i, j)] * D[j]);
+    Ellipsoid::of(P, α)
+}
 
-    /// A solution with the largest α below `limit`.
-    pub fn fastest(A: &DMatrix<f64>, E: &DMatrix<f64>, γ: f64, limit: f64) -> Option<Self> {
-        let mut best = Self::solve(A, E, 1e-6 * limit, γ)?;
-        let (mut low, mut high) = (best.α, limit);
-        for _ in 0..HALVINGS {
-            let middle = low + (high - low) / 2.0;
-            match Self::solve(A, E, middle, γ) {
-                Some(found) => (low, best) = (middle, found),
-                None => high = middle,
-            }
-            if high - low < 1e-4 * high {
-                break;
-            }
+/// A solution with the largest α below `limit`.
+pub fn fastest(A: &DMatrix<f64>, E: &DMatrix<f64>, γ: f64, limit: f64) -> Option<Ellipsoid> {
+    let mut best = solve(A, E, 1e-6 * limit, γ)?;
+    let (mut low, mut high) = (best.α, limit);
+    for _ in 0..HALVINGS {
+        let middle = low + (high - low) / 2.0;
+        match solve(A, E, middle, γ) {
+            Some(found) => (low, best) = (middle, found),
+            None => high = middle,
         }
-        Some(best)
-    }
-
-    /// An upper bound of √cond(P): what |e| may grow by before it decays.
-    pub fn peak(&self) -> f64 {
-        let square = Interval::point(self.largest) / Interval::point(self.smallest);
-        square.sqrt().hi()
-    }
-
-    /// An upper bound of √(fᵀP⁻¹f) for every f up to this length.
-    pub fn weight_of_length(&self, length: f64) -> f64 {
-        (size(length) / Interval::point(self.smallest).sqrt()).hi()
-    }
-
-    /// An upper bound of √(fᵀP⁻¹f): P − ffᵀ/t > 0 says fᵀP⁻¹f < t.
-    pub fn weight(&self, f: &[f64]) -> f64 {
-        let coarse = self.weight_of_length(length(f));
-        let Some(inverse) = self.P.clone().cholesky().map(|c| c.inverse()) else {
-            return coarse;
-        };
-        let column = DVector::from_column_slice(f);
-        let guess = (column.transpose() * inverse * &column)[(0, 0)];
-        let t = Interval::point(guess * (1.0 + 1e-6) + f64::MIN_POSITIVE);
-        let rest = |i: usize, j: usize| {
-            let product = Interval::point(f[i]) * Interval::point(f[j]);
-            Interval::point(self.P[(i, j)]) - product / t
-        };
-        match is_positive_definite(&square(f.len(), rest)) {
-            true => t.sqrt().hi(),
-            false => coarse,
+        if high - low < 1e-4 * high {
+            break;
         }
     }
+    Some(best)
 }
 
 /// E Eᵀ with a little more in each direction, on the scale that P has there.
@@ -196,7 +137,7 @@ mod tests {
         for pole in [-1e308, -1e200, f64::NAN] {
             let A = DMatrix::from_row_slice(2, 2, &[pole, 1.0, pole, 0.0]);
             let E = second();
-            assert!(Riccati::solve(&A, &E, 0.5, 1.0).is_none());
+            assert!(solve(&A, &E, 0.5, 1.0).is_none());
         }
     }
 
@@ -217,14 +158,14 @@ mod tests {
         let A = companion(&[3.0, 2.0]);
         let E = second();
         let limit = 2.0 / 10f64.sqrt();
-        assert!(Riccati::solve(&A, &E, 1e-9, limit * 0.999).is_some());
-        assert!(Riccati::solve(&A, &E, 1e-9, limit * 1.001).is_none());
+        assert!(solve(&A, &E, 1e-9, limit * 0.999).is_some());
+        assert!(solve(&A, &E, 1e-9, limit * 1.001).is_none());
     }
 
     /// Without perturbation the rate is that of the slowest pole.
     #[test]
     fn the_rate_without_perturbation() {
-        let found = Riccati::fastest(&companion(&[3.0, 2.0]), &second(), 1e-6, 1.0);
+        let found = fastest(&companion(&[3.0, 2.0]), &second(), 1e-6, 1.0);
         let found = found.unwrap();
         assert!(found.α > 0.99 && found.smallest <= found.largest);
         // eᵢ'P⁻¹e against the definition

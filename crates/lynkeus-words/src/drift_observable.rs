@@ -37,6 +37,9 @@ impl Words for Germani {
             Self::Riccati => "γ ≤ γ*: K and some P > 0 solve the Riccati inequality",
             Self::Input => "|u| ≤ u_M",
             Self::Filter => "K2 and P_a solve (4.27)",
+            Self::OneFunction => {
+                "one V = e_zᵀP⁻¹e_z falls for the Jacobians of Φ and of the last rows as they come together"
+            }
         };
         words.to_owned()
     }
@@ -108,6 +111,10 @@ impl Words for Said {
             Self::NoLastRows(open) => open_or(open, "the inverse has no bound"),
             Self::NoLipschitzConstant => "γ has no bound".to_owned(),
             Self::NoPoles => "the study gives neither poles nor alpha and gamma".to_owned(),
+            Self::Falls { rate, parts } => format!(
+                "V' ≤ −2·{}·V with Q and the slopes of the last rows as they are at each point, on {parts} parts of the box",
+                short(*rate)
+            ),
             Self::NoP => "no P was found for these poles".to_owned(),
             Self::NoFilterP => "no P_a was found for the filter's poles".to_owned(),
             Self::Indices(outputs) => {

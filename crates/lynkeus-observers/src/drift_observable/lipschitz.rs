@@ -51,6 +51,10 @@ pub(super) struct Lipschitz {
     pub continuous: Finding,
     /// what has no bound
     pub open: Vec<String>,
+    /// what z' holds beside the next row, with the inputs' part, where no filter's error counts
+    pub remainder: Vec<Node>,
+    /// the box, with the derivatives of the inputs
+    pub region: Region,
 }
 
 pub(super) fn bounds(
@@ -112,7 +116,20 @@ pub(super) fn bounds(
         regular: regular(augmented, &form.Q, &region)?,
         continuous,
         open: box_.open(),
+        remainder: driven(augmented, &drift, &inputs),
+        region,
     })
+}
+
+/// r + Σ_j H_j u_j for (3.1), whose H_j the columns are; r for the others.
+fn driven(augmented: &AugmentedPlant<'_>, drift: &[Node], columns: &[Vec<Node>]) -> Vec<Node> {
+    let graph = augmented.graph();
+    let row = |(k, &r): (usize, &Node)| {
+        let pairs = columns.iter().zip(&augmented.inputs);
+        let terms = pairs.map(|(H, u)| graph.expr(H[k]) * graph.expr(u.node));
+        terms.fold(graph.expr(r), |sum, term| sum + term).node()
+    };
+    drift.iter().enumerate().map(row).collect()
 }
 
 /// What z' holds beside the next row, row by row of z.

@@ -23,6 +23,7 @@ mod observer;
 mod said;
 mod settings;
 mod theorem;
+mod together;
 
 use crate::Family;
 use crate::paper::{self, Paper};

@@ -243,7 +243,7 @@ fn solve(augmented: &AugmentedPlant<'_>, Q: &[Node], b: &[Node]) -> Solution {
 }
 
 /// A typical size of a state's variation.
-fn scale(state: &Variable) -> f64 {
+pub(super) fn scale(state: &Variable) -> f64 {
     let width = state.max - state.min;
     match (width.is_finite() && width > 0.0, state.nominal) {
         (true, _) => width,

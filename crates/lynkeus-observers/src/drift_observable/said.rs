@@ -36,6 +36,8 @@ pub enum Germani {
     Input,
     /// the filter's inequality
     Filter,
+    /// in place of the last three: one P for the Jacobians as they come together
+    OneFunction,
 }
 
 /// What is said of a plant, a verdict, an observer or a certificate of the family.
@@ -104,6 +106,13 @@ pub enum Said {
     NoPoles,
     /// no P for the poles
     NoP,
+    /// V falls on the whole box
+    Falls {
+        /// at this rate
+        rate: f64,
+        /// examined part by part, so many
+        parts: usize,
+    },
     /// no P_a for those of the filter
     NoFilterP,
     /// how many derivatives of each of several outputs are used

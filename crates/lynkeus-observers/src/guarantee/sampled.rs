@@ -25,8 +25,9 @@ use nalgebra::DMatrix;
 
 use super::error_system::{Apart, expanded, readings, seen_by, size};
 use super::said::Said;
-use super::together::Joint;
+use super::together;
 use super::{Claim, SEARCH, certify, finite_bounds, spread};
+use crate::field::Joint;
 use crate::{Assumptions, Bounds, DesignError, Observer};
 
 /// The share of the rate with continuous sensors at which the longest interval is sought.
@@ -148,7 +149,7 @@ impl SampledSystem {
         let models = models(augmented, observer, assumptions, &shown)?;
         let region = seen_by(augmented, observer, assumptions)?;
         Ok(Ok(Self {
-            joint: Joint::sampled(augmented, observer, &region, (&shown, &slopes))?,
+            joint: together::sampled(augmented, observer, &region, (&shown, &slopes))?,
             models: models
                 .iter()
                 .map(|m| folded(m, n, &shown, &slopes))

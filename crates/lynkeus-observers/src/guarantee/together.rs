@@ -6,17 +6,13 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Budget, Graph, Interval, MissingInput, Node, Tape, jacobian};
-use lynkeus_proof::decay::{Field, Together, fastest_together, prove_together};
-use lynkeus_proof::matrix::{IntervalMatrix, square};
+use lynkeus_expr::{Budget, Graph, MissingInput, Node, jacobian};
+use lynkeus_proof::decay::{Together, fastest_together, prove_together};
 use lynkeus_structure::{AugmentedPlant, Dimension, Region, regularity};
 
 use super::error_system::{Apart, ErrorSystem, hats};
 use crate::Observer;
-
-/// Numbers that A may depend on: the work grows with the power of them.
-const SIDES: usize = 10;
+use crate::field::Joint;
 
 /// The rate that a proof is sought for.
 pub(super) enum Wanted {
@@ -24,17 +20,6 @@ pub(super) enum Wanted {
     From(f64),
     /// this one
     At(f64),
-}
-
-/// A at every point of a box.
-pub(super) struct Joint {
-    /// row by row
-    entries: Tape,
-    /// the derivatives of the entries that are not 0, with the places of the entries and the numbers; none where an entry
-    /// may jump
-    slopes: Option<(Tape, Vec<(usize, usize)>)>,
-    sides: Vec<Interval>,
-    size: usize,
 }
 
 /// A proof that takes the slopes together, of decay at a rate, or at the fastest one from a least one up to a limit.
@@ -45,7 +30,7 @@ pub(super) fn together(
     (wanted, limit): (Wanted, f64),
     budget: &Budget,
 ) -> Result<Option<Together>, MissingInput> {
-    let Some(joint) = Joint::new(augmented, observer, &system.region)? else {
+    let Some(joint) = continuous(augmented, observer, &system.region)? else {
         return Ok(None);
     };
     let scale = &system.scale;
@@ -55,141 +40,76 @@ pub(super) fn together(
     }))
 }
 
-impl Joint {
-    /// That of an observer whose sensors are read continuously. None where F jumps, where A depends on too many numbers,
-    /// and where a range is open.
-    fn new(
-        augmented: &AugmentedPlant<'_>,
-        observer: &Observer,
-        region: &Region,
-    ) -> Result<Option<Self>, MissingInput> {
-        let graph = augmented.graph();
-        let states: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
-        let apart = Apart::new(augmented, observer, region)?;
-        let moving = [&states[..], &apart.errors()].concat();
-        if !regularity(graph, &apart.derivatives, &moving, &apart.region)?.is_proved() {
-            return Ok(None);
-        }
-        let n = states.len();
-        let found = Blocks::new(graph, &apart, &states, &states);
-        let mut entries = found.right;
-        for (i, k, slope) in found.gains {
-            let entry = &mut entries[i * n + apart.read[k].1.state];
-            *entry = (graph.expr(*entry) + graph.expr(slope)).node();
-        }
-        Self::of(graph, &entries, n, found.region)
+/// That of an observer whose sensors are read continuously. None where F jumps, where A depends on too many numbers,
+/// and where a range is open.
+fn continuous(
+    augmented: &AugmentedPlant<'_>,
+    observer: &Observer,
+    region: &Region,
+) -> Result<Option<Joint>, MissingInput> {
+    let graph = augmented.graph();
+    let states: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
+    let apart = Apart::new(augmented, observer, region)?;
+    let moving = [&states[..], &apart.errors()].concat();
+    if !regularity(graph, &apart.derivatives, &moving, &apart.region)?.is_proved() {
+        return Ok(None);
     }
+    let n = states.len();
+    let found = Blocks::new(graph, &apart, &states, &states);
+    let mut entries = found.right;
+    for (i, k, slope) in found.gains {
+        let entry = &mut entries[i * n + apart.read[k].1.state];
+        *entry = (graph.expr(*entry) + graph.expr(slope)).node();
+    }
+    Joint::of(graph, &entries, n, found.region)
+}
 
-    /// That over (e, ε) of an observer whose measurements w follow the model between samples, ε = (w − y)/c for a sensor
-    /// that shows c·x_s. With the innovations σ = e_s − ε, and G at x̂ and w,
-    ///
-    /// e' = (J + G E) e + (c H − G) ε, ε' = ∂f_s/∂x e,
-    ///
-    /// where H has F's slopes in what is read apart from the innovations, and J, H and ∂f_s/∂x are means over one segment
-    /// from (x, y) to (x̂, w).
-    pub(super) fn sampled(
-        augmented: &AugmentedPlant<'_>,
-        observer: &Observer,
-        region: &Region,
-        (shown, slopes): (&[usize], &[f64]),
-    ) -> Result<Option<Self>, MissingInput> {
-        let graph = augmented.graph();
-        let states: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
-        let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
-        let apart = Apart::new(augmented, observer, region)?;
-        let plant = graph.substitute(&augmented.derivatives, &hats(augmented, observer));
-        let predicted: Vec<Node> = shown.iter().map(|&state| plant[state]).collect();
-        let moving = [&states[..], &apart.errors(), &measured].concat();
-        let all = [&apart.derivatives[..], &predicted].concat();
-        if !regularity(graph, &all, &moving, &apart.region)?.is_proved() {
-            return Ok(None);
-        }
-        let (n, size) = (states.len(), states.len() + shown.len());
-        let found = Blocks::new(graph, &apart, &states, &[&states[..], &measured].concat());
-        let mut entries = vec![graph.constant(0.0).node(); size * size];
-        let mut add = |i: usize, j: usize, factor: f64, slope: Node| {
-            let entry = &mut entries[i * size + j];
-            *entry = (graph.expr(*entry) + factor * graph.expr(slope)).node();
-        };
-        for (place, &slope) in found.right.iter().enumerate() {
-            add(place / n, place % n, 1.0, slope);
-        }
-        for (i, k, slope) in found.gains {
-            let (sensor, own) = &apart.read[k];
-            add(i, own.state, 1.0, slope);
-            add(i, n + sensor, -1.0, slope);
-        }
-        for (i, j, slope) in jacobian::forward(graph, &found.derivatives, &measured).entries {
-            add(i, n + j, slopes[j], slope);
-        }
-        for (j, i, slope) in jacobian::forward(graph, &predicted, &states).entries {
-            add(n + j, i, 1.0, slope);
-        }
-        Self::of(graph, &entries, size, found.region)
+/// That over (e, ε) of an observer whose measurements w follow the model between samples, ε = (w − y)/c for a sensor
+/// that shows c·x_s. With the innovations σ = e_s − ε, and G at x̂ and w,
+///
+/// e' = (J + G E) e + (c H − G) ε, ε' = ∂f_s/∂x e,
+///
+/// where H has F's slopes in what is read apart from the innovations, and J, H and ∂f_s/∂x are means over one segment
+/// from (x, y) to (x̂, w).
+pub(super) fn sampled(
+    augmented: &AugmentedPlant<'_>,
+    observer: &Observer,
+    region: &Region,
+    (shown, slopes): (&[usize], &[f64]),
+) -> Result<Option<Joint>, MissingInput> {
+    let graph = augmented.graph();
+    let states: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
+    let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
+    let apart = Apart::new(augmented, observer, region)?;
+    let plant = graph.substitute(&augmented.derivatives, &hats(augmented, observer));
+    let predicted: Vec<Node> = shown.iter().map(|&state| plant[state]).collect();
+    let moving = [&states[..], &apart.errors(), &measured].concat();
+    let all = [&apart.derivatives[..], &predicted].concat();
+    if !regularity(graph, &all, &moving, &apart.region)?.is_proved() {
+        return Ok(None);
     }
-
-    fn of(
-        graph: &Graph,
-        entries: &[Node],
-        size: usize,
-        region: Region,
-    ) -> Result<Option<Self>, MissingInput> {
-        let used = graph.symbols_of(entries);
-        let mut sides = region;
-        sides.dimensions.retain(|side| used.contains(&side.symbol));
-        let is_finite = |side: &Interval| side.is_bounded();
-        let ends: Option<Vec<Interval>> = sides
-            .dimensions
-            .iter()
-            .map(|side| Interval::new(side.min, side.max).ok().filter(is_finite))
-            .collect();
-        let Some(ends) = ends.filter(|ends| ends.len() <= SIDES) else {
-            return Ok(None);
-        };
-        let symbols = sides.symbols();
-        let is_smooth = regularity(graph, entries, &symbols, &sides)?.is_proved();
-        let slopes = match is_smooth {
-            true => {
-                let found = jacobian::forward(graph, entries, &symbols).entries;
-                let nodes: Vec<Node> = found.iter().map(|entry| entry.2).collect();
-                let places = found.iter().map(|entry| (entry.0, entry.1)).collect();
-                Some((Tape::new(graph, &symbols, &nodes)?, places))
-            }
-            false => None,
-        };
-        Ok(Some(Self {
-            entries: Tape::new(graph, &symbols, entries)?,
-            slopes,
-            sides: ends,
-            size,
-        }))
+    let (n, size) = (states.len(), states.len() + shown.len());
+    let found = Blocks::new(graph, &apart, &states, &[&states[..], &measured].concat());
+    let mut entries = vec![graph.constant(0.0).node(); size * size];
+    let mut add = |i: usize, j: usize, factor: f64, slope: Node| {
+        let entry = &mut entries[i * size + j];
+        *entry = (graph.expr(*entry) + factor * graph.expr(slope)).node();
+    };
+    for (place, &slope) in found.right.iter().enumerate() {
+        add(place / n, place % n, 1.0, slope);
     }
-
-    /// What a proof needs of it.
-    pub(super) fn field<T>(&self, look: impl FnOnce(&Field<'_>) -> T) -> T {
-        let on = |part: &[Interval]| self.on(part);
-        let slopes = |part: &[Interval]| self.slopes(part);
-        look(&Field {
-            on: &on,
-            slopes: self.slopes.is_some().then_some(&slopes),
-            sides: self.sides.clone(),
-        })
+    for (i, k, slope) in found.gains {
+        let (sensor, own) = &apart.read[k];
+        add(i, own.state, 1.0, slope);
+        add(i, n + sensor, -1.0, slope);
     }
-
-    fn on(&self, part: &[Interval]) -> IntervalMatrix {
-        let entries = self.entries.eval_in(&Intervals, part);
-        entries.chunks(self.size).map(<[_]>::to_vec).collect()
+    for (i, j, slope) in jacobian::forward(graph, &found.derivatives, &measured).entries {
+        add(i, n + j, slopes[j], slope);
     }
-
-    fn slopes(&self, part: &[Interval]) -> Vec<IntervalMatrix> {
-        let mut all = vec![square(self.size, |_, _| Interval::ZERO); part.len()];
-        if let Some((tape, places)) = &self.slopes {
-            for (value, (entry, side)) in tape.eval_in(&Intervals, part).into_iter().zip(places) {
-                all[*side][entry / self.size][entry % self.size] = value;
-            }
-        }
-        all
+    for (j, i, slope) in jacobian::forward(graph, &predicted, &states).entries {
+        add(n + j, i, 1.0, slope);
     }
+    Joint::of(graph, &entries, size, found.region)
 }
 
 /// The slopes of F where the innovations vanish, and in these, which are not at the same points.

@@ -73,7 +73,10 @@ impl Frame {
     pub fn widened(&self, shown: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
         let n = self.sizes.len();
         let sizes: Vec<f64> = shown.iter().map(|&s| self.sizes[s]).collect();
-        let size = |i: usize| self.sizes.get(i).copied().unwrap_or(sizes[i.max(n) - n]);
+        let size = |i: usize| match i < n {
+            true => self.sizes[i],
+            false => sizes[i - n],
+        };
         let of = |axes: &DMatrix<f64>, entry: &dyn Fn(usize, usize) -> f64| {
             DMatrix::from_fn(n + sizes.len(), n + sizes.len(), |i, j| {
                 match i < n && j < n {

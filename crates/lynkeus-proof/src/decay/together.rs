@@ -74,7 +74,12 @@ pub fn holds_together(field: &Field<'_>, P: &DMatrix<f64>, rate: f64, budget: &B
 }
 
 /// The same of a form that may change, with so many parts left to examine.
-fn covered(field: &Field<'_>, form: Option<Form>, left: &mut usize, budget: &Budget) -> Covered {
+pub(super) fn covered(
+    field: &Field<'_>,
+    form: Option<Form>,
+    left: &mut usize,
+    budget: &Budget,
+) -> Covered {
     let mut cover = Cover::new(field);
     // no other form follows
     cover.room = 0;
@@ -209,6 +214,11 @@ fn middle(part: &[Interval]) -> Vec<f64> {
     part.iter().map(|side| side.midpoint()).collect()
 }
 
+/// A in the middle of the box.
+pub(super) fn in_the_middle(field: &Field<'_>) -> IntervalMatrix {
+    (field.on)(&points_of(&middle(&field.sides)))
+}
+
 fn points_of(point: &[f64]) -> Vec<Interval> {
     point.iter().map(|&x| Interval::point(x)).collect()
 }
@@ -222,14 +232,14 @@ fn add(sums: &mut [Interval], times: Interval, row: &[Interval]) {
     }
 }
 
-/// P' + He(P A) + 2·rate·P in axes T in which P is about the unit: for an invertible T it is negative definite there
-/// where it is so in those of P, and for another one nowhere.
+/// D + He(L A R) in axes T in which it is about −1: for an invertible T it is negative definite there where it is so in
+/// axes of its own, and for another one nowhere. For V = eᵀPe it is P' + He(P A) + 2·rate·P.
 pub(super) struct Form {
-    /// TᵀP and T
+    /// TᵀL and RT
     sides: [IntervalMatrix; 2],
-    /// Tᵀ(P' + 2·rate·P)T
+    /// TᵀDT
     decay: IntervalMatrix,
-    /// how much an entry of A counts for: the lengths of the columns of TᵀP and of the rows of T
+    /// how much an entry of A counts for: the lengths of the columns of TᵀL and of the rows of RT
     weights: [Vec<f64>; 2],
 }
 
@@ -242,28 +252,33 @@ impl Form {
     pub fn changing(P: &DMatrix<f64>, change: &IntervalMatrix, rate: f64) -> Option<Self> {
         let sound = is_form(P) && rate.is_finite() && is_positive_definite(&points(P));
         let T = sound.then(|| P.clone().cholesky()?.l().transpose().try_inverse())??;
-        let left = product(&points(&T.transpose()), &points(P));
-        let right = points(&T);
-        let twice = Interval::point(2.0) * Interval::point(rate);
-        let whole = product(&left, &right);
-        let transposed = points(&T.transpose());
-        let moved = product(&product(&transposed, change), &right);
-        let n = P.nrows();
-        Some(Self {
-            decay: square(n, |i, j| twice * whole[i][j] + moved[i][j]),
-            weights: [
-                (T.transpose() * P)
-                    .column_iter()
-                    .map(|c| c.norm())
-                    .collect(),
-                T.row_iter().map(|r| r.norm()).collect(),
-            ],
-            sides: [left, right],
-        })
+        let (n, twice) = (P.nrows(), Interval::point(2.0) * Interval::point(rate));
+        let decay = square(n, |i, j| change[i][j] + twice * Interval::point(P[(i, j)]));
+        Some(Self::of([P, &DMatrix::identity(n, n)], &decay, &T))
     }
 
-    /// The lower triangle of −He(TᵀPAT) less another form. Entries that are 0 count for nothing: what has no value
-    /// anywhere in A comes with an entry of either diagonal, and none of these is 0.
+    /// Of L, R, D and T.
+    pub fn of([L, R]: [&DMatrix<f64>; 2], decay: &IntervalMatrix, T: &DMatrix<f64>) -> Self {
+        let [left, right, transposed] = [L, R, &T.transpose()].map(points);
+        let T = points(T);
+        let sides = [product(&transposed, &left), product(&right, &T)];
+        let length = |entries: &mut dyn Iterator<Item = &Interval>| {
+            let squares = entries.map(|entry| entry.midpoint().powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        let column = |j: usize| length(&mut sides[0].iter().map(|row| &row[j]));
+        Self {
+            decay: product(&product(&transposed, decay), &T),
+            weights: [
+                (0..L.ncols()).map(column).collect(),
+                sides[1].iter().map(|row| length(&mut row.iter())).collect(),
+            ],
+            sides,
+        }
+    }
+
+    /// The lower triangle of −He(TᵀLART) less another form. Entries that are 0 count for nothing: what has no value
+    /// anywhere in A comes with every row of TᵀL and with an entry of RT that is not 0.
     fn lower(&self, A: &IntervalMatrix, less: Option<&IntervalMatrix>) -> IntervalMatrix {
         let [left, right] = &self.sides;
         let n = A.len();
@@ -430,25 +445,44 @@ pub(super) fn first_points(sides: &[Interval], count: usize) -> Vec<Vec<f64>> {
     found
 }
 
+/// What is sought for a field: a form that falls, proposed for some points and decided on the whole box.
+pub(super) trait Sought {
+    /// what makes a form
+    type Found;
+
+    /// Something that falls at a rate for these A, as far as numbers tell.
+    fn propose(&self, points: &[IntervalMatrix], rate: f64, budget: &Budget)
+    -> Option<Self::Found>;
+
+    /// Its form at a rate; none where it has none. A is one of the points.
+    fn form(&self, found: &Self::Found, rate: f64, A: &IntervalMatrix) -> Option<Form>;
+}
+
 /// Proofs for a field, from the points that earlier ones failed at.
-struct Search<'a> {
+pub(super) struct Search<'a, S> {
     field: &'a Field<'a>,
-    scale: &'a [f64],
+    sought: S,
     budget: &'a Budget,
-    /// A at points of the box
-    models: Vec<ErrorModel>,
-    /// parts that may still be examined
+    /// A at points of the box, in its middle first
+    points: Vec<IntervalMatrix>,
+    /// parts that may be examined, and that still may be
+    all: usize,
     left: usize,
 }
 
-impl<'a> Search<'a> {
-    fn new(field: &'a Field<'a>, scale: &'a [f64], budget: &'a Budget) -> Self {
+/// What falls on a box, at which rate, and on how many parts.
+pub(super) type Fallen<T> = (T, f64, usize);
+
+impl<'a, S: Sought> Search<'a, S> {
+    /// A search that examines so many parts.
+    pub fn new(field: &'a Field<'a>, sought: S, parts: usize, budget: &'a Budget) -> Self {
         let mut search = Self {
             field,
-            scale,
+            sought,
             budget,
-            models: vec![],
-            left: ALL_PARTS,
+            points: vec![],
+            all: parts,
+            left: parts,
         };
         for point in first_points(&field.sides, CORNERS + 1) {
             search.add(&point);
@@ -456,42 +490,37 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// Whether A has a value there.
+    /// A at the points that counted.
+    pub fn points(&self) -> &[IntervalMatrix] {
+        &self.points
+    }
+
+    /// Whether A has a value there, and another one than at the points before.
     fn add(&mut self, point: &[f64]) -> bool {
-        let model = ErrorModel {
-            constant: (self.field.on)(&points_of(point)),
-            sectors: vec![],
-        };
-        let is_new = model.is_bounded() && !self.models.contains(&model);
+        let A = (self.field.on)(&points_of(point));
+        let is_bounded = A.iter().flatten().all(|entry| entry.is_bounded());
+        let is_new = is_bounded && !self.points.contains(&A);
         if is_new {
-            self.models.push(model);
+            self.points.push(A);
         }
         is_new
     }
 
-    /// A proof at a rate, from the P of one that is faster.
-    fn prove(&mut self, rate: f64, limit: f64) -> Option<Together> {
+    /// A proof at a rate, from what falls faster. Nothing decays faster than `limit`.
+    pub fn prove(&mut self, rate: f64, limit: f64) -> Option<Fallen<S::Found>> {
         let mut faster = MARGINS.iter().map(|share| rate + share * limit);
         faster.find_map(|faster| self.prove_by(rate, faster))
     }
 
-    fn prove_by(&mut self, rate: f64, faster: f64) -> Option<Together> {
+    fn prove_by(&mut self, rate: f64, faster: f64) -> Option<Fallen<S::Found>> {
         for _ in 0..ADDED {
             if self.left == 0 {
                 return None;
             }
-            let found = prove(&self.models, self.scale, faster, self.budget)?;
-            let form = Form::new(&found.P, rate);
+            let found = self.sought.propose(&self.points, faster, self.budget)?;
+            let form = self.sought.form(&found, rate, self.points.first()?);
             match covered(self.field, form, &mut self.left, self.budget) {
-                Covered::By(parts) => {
-                    let multipliers = vec![];
-                    let proof = Proof {
-                        rate,
-                        multipliers,
-                        ..found
-                    };
-                    return Some(Together { proof, parts });
-                }
+                Covered::By(parts) => return Some((found, rate, parts)),
                 Covered::Not(point) => {
                     if !self.add(&point) {
                         return None;
@@ -502,6 +531,64 @@ impl<'a> Search<'a> {
         }
         None
     }
+
+    /// The fastest decay from a rate up to `limit` that is proved, by bisection; none where nothing that fast is.
+    pub fn fastest(&mut self, least: f64, limit: f64) -> Option<Fallen<S::Found>> {
+        if least > 0.0 {
+            self.left = FIRST_PARTS.min(self.all);
+        }
+        let mut best = self.prove(least.max(NEGLIGIBLE * limit), limit)?;
+        self.left = self.all;
+        let mut high = limit;
+        while best.1 < high * (1.0 - ACCURACY) && self.budget.spent().is_none() {
+            let rate = match best.1 < 0.1 * high {
+                true => (best.1 * high).sqrt(),
+                false => f64::midpoint(best.1, high),
+            };
+            match self.prove(rate, limit) {
+                Some(found) => best = found,
+                None => high = rate,
+            }
+        }
+        Some(best)
+    }
+}
+
+/// V = eᵀPe for states of such sizes.
+struct OneForm<'a>(&'a [f64]);
+
+impl Sought for OneForm<'_> {
+    type Found = DMatrix<f64>;
+
+    fn propose(
+        &self,
+        points: &[IntervalMatrix],
+        rate: f64,
+        budget: &Budget,
+    ) -> Option<Self::Found> {
+        let model = |A: &IntervalMatrix| ErrorModel {
+            constant: A.clone(),
+            sectors: vec![],
+        };
+        let models: Vec<ErrorModel> = points.iter().map(model).collect();
+        prove(&models, self.0, rate, budget).map(|proof| proof.P)
+    }
+
+    fn form(&self, P: &Self::Found, rate: f64, _: &IntervalMatrix) -> Option<Form> {
+        Form::new(P, rate)
+    }
+}
+
+impl From<Fallen<DMatrix<f64>>> for Together {
+    fn from((P, rate, parts): Fallen<DMatrix<f64>>) -> Self {
+        let multipliers = vec![];
+        let proof = Proof {
+            rate,
+            P,
+            multipliers,
+        };
+        Self { proof, parts }
+    }
 }
 
 /// A proof of decay at `rate` on the box; none where none is found. Nothing decays faster than `limit`.
@@ -511,7 +598,8 @@ pub fn prove_together(
     (rate, limit): (f64, f64),
     budget: &Budget,
 ) -> Option<Together> {
-    Search::new(field, scale, budget).prove(rate, limit)
+    let mut search = Search::new(field, OneForm(scale), ALL_PARTS, budget);
+    search.prove(rate, limit).map(Together::from)
 }
 
 /// The fastest decay from a rate up to `limit` that is proved on the box, by bisection; none where nothing that fast is.
@@ -521,24 +609,8 @@ pub fn fastest_together(
     (least, limit): (f64, f64),
     budget: &Budget,
 ) -> Option<Together> {
-    let mut search = Search::new(field, scale, budget);
-    if least > 0.0 {
-        search.left = FIRST_PARTS;
-    }
-    let mut best = search.prove(least.max(NEGLIGIBLE * limit), limit)?;
-    search.left = ALL_PARTS;
-    let mut high = limit;
-    while best.proof.rate < high * (1.0 - ACCURACY) && budget.spent().is_none() {
-        let rate = match best.proof.rate < 0.1 * high {
-            true => (best.proof.rate * high).sqrt(),
-            false => f64::midpoint(best.proof.rate, high),
-        };
-        match search.prove(rate, limit) {
-            Some(found) => best = found,
-            None => high = rate,
-        }
-    }
-    Some(best)
+    let mut search = Search::new(field, OneForm(scale), ALL_PARTS, budget);
+    search.fastest(least, limit).map(Together::from)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 mod chains;
 mod decay;
+mod implicit;
 mod matrices;
 
 use nalgebra::DMatrix;

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Budget, Interval};
 use lynkeus_proof::decay::{self, ErrorModel, Proof, Sector};
-use lynkeus_proof::riccati::Riccati;
+use lynkeus_proof::riccati;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
@@ -177,7 +177,7 @@ fn riccati_solutions_satisfy_the_inequality() {
         let A = random.matrix(n, 1.0) - DMatrix::identity(n, n) * 2.0;
         let E = random.matrix(n, 0.5);
         let γ = random.within(0.0, 1.5);
-        let Some(found) = Riccati::fastest(&A, &E, γ, 2.0) else {
+        let Some(found) = riccati::fastest(&A, &E, γ, 2.0) else {
             continue;
         };
         proved += 1;
