@@ -17,17 +17,19 @@ impl Certificate {
         list.map(Vec::as_slice).unwrap_or_default()
     }
 
-    /// The rate proved by the inequality.
+    /// The fastest rate proved by an inequality for one Lyapunov function, of the states or of the outputs' derivatives.
     pub fn rate_by_inequality(&self) -> Option<f64> {
-        let inequality = |h: &&Value| {
+        let is_proof = |h: &&Value| {
             let name = h["name"].as_str().unwrap_or_default();
             name.starts_with("one Lyapunov function") && h["verdict"] == "proved"
         };
-        let proof = self.entries("hypotheses").iter().find(inequality)?;
         // the theorem may promise more, but this is about the inequality
-        let detail = proof["detail"].as_str()?;
-        let (_, rest) = detail.split_once("2·")?;
-        rest.split_once('·')?.0.parse().ok()
+        let rate = |proof: &Value| {
+            let (_, rest) = proof["detail"].as_str()?.split_once("2·")?;
+            rest.split_once('·')?.0.parse().ok()
+        };
+        let proofs = self.entries("hypotheses").iter().filter(is_proof);
+        proofs.filter_map(rate).max_by(f64::total_cmp)
     }
 
     /// A constant of the theorem.

@@ -38,7 +38,7 @@ impl Words for Germani {
             Self::Input => "|u| ≤ u_M",
             Self::Filter => "K2 and P_a solve (4.27)",
             Self::OneFunction => {
-                "one V = e_zᵀP⁻¹e_z falls for the Jacobians of Φ and of the last rows as they come together"
+                "one Lyapunov function e_zᵀP⁻¹e_z of the outputs' derivatives for the whole box"
             }
         };
         words.to_owned()
@@ -112,7 +112,7 @@ impl Words for Said {
             Self::NoLipschitzConstant => "γ has no bound".to_owned(),
             Self::NoPoles => "the study gives neither poles nor alpha and gamma".to_owned(),
             Self::Falls { rate, parts } => format!(
-                "V' ≤ −2·{}·V with Q and the slopes of the last rows as they are at each point, on {parts} parts of the box",
+                "V' ≤ −2·{}·V for Q and the slopes of the last rows as they are together at each point of the box, in {parts} parts of it",
                 short(*rate)
             ),
             Self::NoP => "no P was found for these poles".to_owned(),

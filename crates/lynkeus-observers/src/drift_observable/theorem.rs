@@ -6,7 +6,7 @@
 //!
 //! ν' ≤ −2αν + |e_a|² + 2√ν √(fᵀP⁻¹f)
 //!
-//! e_a is the error of the filter, zero for (3.1) and (4.1). P is sought for the study's K,
+//! Where [`super::together`] proves a faster decay of such a ν, that one counts. e_a is the error of the filter, zero for (3.1) and (4.1). P is sought for the study's K,
 //! not K for a P: the theorems only ask that there is one.
 //!
 //! In (4.39) the print drops γ²_Φ̄⁻¹|e_a|², in (4.40) c₃ lacks the factor γ and c₂ has √γ for γ.
@@ -342,7 +342,8 @@ impl Proof<'_, '_> {
         let at_most = |found: f64, limit: f64| Reason::AtMost { found, limit };
         let holds = limit >= γ;
         if limit.is_finite() && γ.is_finite() && γ > 0.0 {
-            constants.push(Constant::new("γ*", limit, "what these poles can bear"));
+            let meaning = "the γ that these poles can bear by the Riccati inequality";
+            constants.push(Constant::new("γ*", limit, meaning));
             checks.push(sufficient(Germani::Riccati, holds, at_most(γ, limit)));
             constants.extend(self.scale());
         } else if !γ.is_finite() {
@@ -395,7 +396,7 @@ impl Proof<'_, '_> {
             && riccati::solve(A, &spread(g), SLOW * slowest, 1.0).is_some()
     }
 
-    /// The smallest factor of all poles that the proof allows.
+    /// The smallest factor of all poles that the Riccati inequality allows.
     fn scale(&self) -> Option<Constant> {
         let bears = |s: f64| {
             let scaled = |λ: &Vec<Pole>| -> Vec<f64> {
@@ -406,7 +407,7 @@ impl Proof<'_, '_> {
             self.bears(&closed_loop(&K), &self.lipschitz.drift, s * self.slowest)
         };
         let s = edge(bears)?;
-        let meaning = "the proof allows these poles times this factor, without input";
+        let meaning = "the Riccati inequality allows these poles times this factor, without input";
         Some(Constant::new("s0", s, meaning))
     }
 

@@ -16,6 +16,7 @@ use lynkeus_structure::{
 };
 use nalgebra::DMatrix;
 
+use super::conditioned::conditioned;
 use super::said::{Inequality, Said};
 use crate::statement::proved;
 use crate::{Assumptions, Check, InputDerivative, Observer, Statement};
@@ -305,8 +306,15 @@ impl Apart {
             let side = Dimension::new(name, symbol, -size, size);
             sides.dimensions.push(side);
         }
+        let derivatives = graph.substitute(&observer.derivatives, &images);
+        let symbols: Vec<Node> = read
+            .iter()
+            .map(|(_, own): &(_, Innovation)| own.symbol)
+            .collect();
+        let (derivatives, further) = conditioned(graph, derivatives, &symbols, &sides)?;
+        sides.dimensions.extend(further);
         Ok(Self {
-            derivatives: graph.substitute(&observer.derivatives, &images),
+            derivatives,
             read,
             region: sides,
         })

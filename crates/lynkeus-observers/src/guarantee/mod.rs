@@ -22,6 +22,7 @@
 //! Process noise, white with the densities Q on x', adds tr(PQ) to (E V)'. What it and Gaussian errors of readings leave
 //! in mean square and in probability is in [`lynkeus_proof::noise`]; √(E e_i²) obeys what |e_i| did.
 
+mod conditioned;
 mod correction;
 mod error_system;
 mod lmi;

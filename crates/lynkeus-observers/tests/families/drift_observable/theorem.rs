@@ -369,7 +369,7 @@ fn the_jacobians_together_prove_slower_poles() {
     let found = certificate(&plant, &at(1.0), &[0.0; 2], &[0.0]);
     assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
     assert!(value(&found, "s0") > 2.0 && value(&found, "γ") > value(&found, "γ*"));
-    let falls = hypothesis(&found, "as they come together");
+    let falls = hypothesis(&found, "of the outputs' derivatives for the whole box");
     assert!(falls.is_proved());
     let slow = certificate(&plant, &at(0.2), &[0.0; 2], &[0.0]);
     assert_eq!(slow.verdict(), Standing::Undecided);
