@@ -1,8 +1,10 @@
 //! What is certified of an observer as a system, whatever its family.
 
 use crate::common::{design_with, plant};
+use lynkeus_observers::drift_observable::DRIFT_OBSERVABLE;
 use lynkeus_observers::guarantee::{SampledDecay, between_samples};
-use lynkeus_observers::{Assumptions, Certificate, Claim, Tuning, certify, triangular::TRIANGULAR};
+use lynkeus_observers::triangular::TRIANGULAR;
+use lynkeus_observers::{Assumptions, Certificate, Claim, Tuning, Value, certify};
 use lynkeus_structure::{AugmentedPlant, Sensors, Standing};
 use lynkeus_words::Words;
 
@@ -147,4 +149,28 @@ fn samples_count_slopes_as_they_are_together() {
         }
     }
     assert!(followed > 3000, "{followed}");
+}
+
+/// The correction by a linear system with Q(x̂), withdrawn where the factorisation finds Q almost singular: at no point of this
+/// box, which the proof has to know.
+#[test]
+fn observers_that_solve_for_their_correction_have_slopes() {
+    let text = include_str!("../../../../examples/predator-prey/predator_prey.mo");
+    let text = text
+        .replace("min = 0.2, max = 8", "min = 1.5, max = 4.5")
+        .replace("min = 0.05, max = 6", "min = 0.6, max = 1.8");
+    let plant = plant(&text);
+    let poles = Value::List([-2.0, -3.0].map(Value::Number).to_vec());
+    let mut tuning = Tuning::default();
+    tuning.values.insert("poles".into(), poles);
+    let design = design_with(DRIFT_OBSERVABLE, &plant, &[], &tuning).unwrap();
+    let augmented = AugmentedPlant::new(&plant, &Sensors::default()).unwrap();
+    let assumptions = Assumptions::new(&augmented, augmented.region()).unwrap();
+    let observer = &design.observer;
+    let found = certify(&augmented, observer, &assumptions, Claim::Fastest).unwrap();
+    let rate = found.rate.unwrap();
+    // from the eigenvalues at x̂ = x on a grid, with NumPy: the slowest decays at 1.32
+    assert!(rate > 0.8 && rate < 1.33, "{rate}");
+    let sampled = between_samples(&augmented, observer, &assumptions, rate, None).unwrap();
+    assert!(sampled.is_ok_and(|sampled| sampled.longest.interval > 0.1));
 }
