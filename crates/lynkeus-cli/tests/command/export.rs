@@ -43,8 +43,10 @@ const OBSERVERS: [(&str, &str); 14] = [
     ("column", "study-noise.toml"),
 ];
 
-/// Filters of random plants among which every kind of option occurs: family, noise, limits, gate, sigma points, steps, `sd`.
-const FILTERS: [u64; 6] = [13, 21, 35, 41, 79, 399];
+/// Filters of random plants among which every kind of option occurs: family, noise, limits, gate, sigma points, steps, `sd`;
+/// the last one makes a millionfold of rounding errors.
+const FILTERS: [u64; 7] = [13, 21, 35, 41, 79, 399, AMPLIFIES];
+const AMPLIFIES: u64 = 141;
 
 pub(super) fn has(command: &str) -> bool {
     let mut asked = Command::new(command);
@@ -211,8 +213,12 @@ pub(super) type Run = (Vec<String>, Vec<Vec<f64>>, bool);
 
 /// Of the study s.toml and the log log.csv.
 pub(super) fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
+    estimated_of(folder, "log.csv")
+}
+
+fn estimated_of(folder: &Path, log: &str) -> Result<Run, lynkeus::Error> {
     let study = Study::load(folder.join("s.toml"))?;
-    let log = Table::load(folder.join("log.csv"))?;
+    let log = Table::load(folder.join(log))?;
     let outcome = lynkeus::estimate(&study, &log, &mut |_| ControlFlow::Continue(()))?;
     let columns = outcome.columns();
     let header = columns.iter().map(|(name, _)| name.clone()).collect();
@@ -280,17 +286,44 @@ pub(super) fn difference(a: &Run, b: &Run, study: &str) -> f64 {
         length(b),
         "rows, and whether all of them: {study}"
     );
+    apart(a, b).last().copied().unwrap_or(0.0)
+}
+
+/// The same up to each row that both have.
+fn apart(a: &Run, b: &Run) -> Vec<f64> {
+    let size = |column: usize| {
+        let column = a.1.iter().map(|row| row[column].abs());
+        column.fold(1e-300, f64::max)
+    };
+    let sizes: Vec<f64> = (0..a.0.len()).map(size).collect();
     let mut worst = 0.0_f64;
-    for column in 0..a.0.len() {
-        let size =
-            a.1.iter()
-                .fold(1e-300, |m: f64, row| m.max(row[column].abs()));
-        for (x, y) in a.1.iter().zip(&b.1) {
-            let off = (x[column] - y[column]).abs() / size;
-            worst = if off <= worst { worst } else { off };
+    let row = |(x, y): (&Vec<f64>, &Vec<f64>)| {
+        for ((x, y), size) in x.iter().zip(y).zip(&sizes) {
+            let is_same = x == y || (x.is_nan() && y.is_nan());
+            let off = if is_same { 0.0 } else { (x - y).abs() / size };
+            // a number and none are as far apart as can be
+            worst = worst.max(if off.is_nan() { f64::INFINITY } else { off });
         }
+        worst
+    };
+    a.1.iter().zip(&b.1).map(row).collect()
+}
+
+/// The log with every reading and input a few units of its last digit off, up or down.
+fn moved(random: &mut Normal, log: &str) -> String {
+    let (header, rows) = log.split_once('\n').unwrap();
+    let mut text = format!("{header}\n");
+    for row in rows.lines() {
+        let cells = row.split(',').enumerate().map(|(column, cell)| {
+            let sign = if random.uniform() < 0.5 { 1.0 } else { -1.0 };
+            match cell.parse::<f64>() {
+                Ok(x) if column > 0 => format!("{:e}", x * (1.0 + sign * 1e-15)),
+                _ => cell.to_owned(),
+            }
+        });
+        text += &(cells.collect::<Vec<_>>().join(",") + "\n");
     }
-    worst
+    text
 }
 
 /// A study that was exported as C, and its estimates.
@@ -301,9 +334,17 @@ struct Looked {
 }
 
 impl Looked {
-    /// Compares what a language other than C has made of the study. Where it calls functions that no standard defines to the
-    /// last digit, these differ from the C library's: the plant carries that on, and a filter that runs away multiplies it.
-    fn compare(&self, mut found: Run, language: &str, calls_functions: bool) {
+    /// Compares what a language other than C has made of the study.
+    fn compare(&self, found: Run, language: &str, calls_functions: bool) {
+        if let Err(off) = self.compared(found, calls_functions) {
+            let study = self.folder.read("s.toml");
+            panic!("seed {}, {language}: {off}\n{study}", self.seed);
+        }
+    }
+
+    /// Where a language calls functions that no standard defines to the last digit, these differ from the C library's: the plant
+    /// carries that on, and a filter that runs away multiplies it.
+    fn compared(&self, mut found: Run, calls_functions: bool) -> Result<(), String> {
         let mut expected = self.expected.clone();
         let mut limit = 1e-12;
         if calls_functions {
@@ -316,13 +357,39 @@ impl Looked {
                 run.2 = true;
             }
         }
-        let study = self.folder.read("s.toml");
-        let off = difference(&expected, &found, &study);
-        assert!(
-            off <= limit,
-            "seed {}, {language}: {off:e}\n{study}",
-            self.seed
-        );
+        let off = difference(&expected, &found, &self.folder.read("s.toml"));
+        match off <= limit {
+            true => Ok(()),
+            false if calls_functions => self.rows_compared(&expected, &found),
+            false => Err(format!("{off:e}")),
+        }
+    }
+
+    /// Some studies make a millionfold of the last digit: a plant that is unstable for a while beside a filter that does not see
+    /// it. There each row is held against how far the study's own estimates move up to it with the last digits of the log.
+    /// Of two hundred studies none was off by more than 1.2 times what three moved logs make.
+    fn rows_compared(&self, expected: &Run, found: &Run) -> Result<(), String> {
+        let log = self.folder.read("log.csv");
+        let mut random = Normal(self.seed);
+        let mut reach = vec![0.0_f64; expected.1.len()];
+        for _ in 0..4 {
+            self.folder.write("moved.csv", &moved(&mut random, &log));
+            let run = estimated_of(self.folder.path.path(), "moved.csv");
+            // a run that ends says nothing of what follows
+            let apart = apart(expected, &run.map_err(|e| e.to_string())?).into_iter();
+            let apart = apart.chain(std::iter::repeat(f64::INFINITY));
+            for (reach, apart) in reach.iter_mut().zip(apart) {
+                *reach = reach.max(apart);
+            }
+        }
+        let off = apart(expected, found);
+        let mut rows = off.iter().zip(&reach).enumerate();
+        match rows.find(|(_, (off, reach))| **off > 1e-9 + 10.0 * **reach) {
+            None => Ok(()),
+            Some((row, (off, reach))) => Err(format!(
+                "{off:e} up to row {row}, where the last digits of the log make {reach:e}"
+            )),
+        }
     }
 }
 

@@ -254,6 +254,17 @@ fn van_der_pol() -> Problem {
     problem(right, &[(1.25, 1.55), (2.35, 2.45)], &[], &[])
 }
 
+/// Two of them, coupled by a spring.
+fn coupled() -> Problem {
+    let right: &Right = &|_, v| {
+        let [x1, y1, x2, y2] = [v[0], v[1], v[2], v[3]];
+        let slope = |x, y, other| (1.0 - x * x) * y - 2.0 * x + other;
+        vec![y1, slope(x1, y1, x2), y2, slope(x2, y2, x1)]
+    };
+    let start = [(1.25, 1.55), (2.35, 2.45)].repeat(2);
+    problem(right, &start, &[], &[])
+}
+
 fn laub_loomis(width: f64) -> Problem {
     let right: &Right = &|_, x| {
         vec![
@@ -314,7 +325,10 @@ fn published_plants() {
 #[test]
 #[ignore = "takes minutes, and is meant for a release build: a hundred thousand runs per plant"]
 fn published_plants_with_many_runs() {
-    let mut plants = vec![("van der Pol", van_der_pol(), 7.0, 100_000)];
+    let mut plants = vec![
+        ("van der Pol", van_der_pol(), 7.0, 100_000),
+        ("coupled van der Pol", coupled(), 7.0, 100_000),
+    ];
     plants.extend([0.01, 0.05, 0.1].map(|w| ("Laub-Loomis", laub_loomis(w), 20.0, 100_000)));
     plants.push(("Lotka-Volterra", lotka_volterra(), 3.64, 100_000));
     let rates = [(1e2, 1e3), (1e3, 1e5), (1e3, 1e7)];

@@ -2,8 +2,9 @@
 
 use std::process::Command;
 
-use super::{Looked, Run};
-use crate::Folder;
+use super::{AMPLIFIES, Looked, Run, estimated, filter, has};
+use crate::normal::Normal;
+use crate::{Folder, skipped};
 
 /// A log through a module.
 const REPLAY: &str = r#"
@@ -64,4 +65,25 @@ pub(crate) fn replayed_by(folder: &Folder, more: &str) -> Run {
 pub(super) fn check(looked: &Looked) {
     let found = replayed(&looked.folder);
     looked.compare(found, "JavaScript", calls_functions(&looked.folder));
+}
+
+/// A sine that is wrong in its twelfth digit is no rounding, however much a study makes of that.
+#[test]
+fn a_wrong_function_is_found_where_a_study_amplifies() {
+    if !has("node") {
+        return skipped("node is not there");
+    }
+    let folder = Folder::empty();
+    filter(&mut Normal(1000 + AMPLIFIES), &folder);
+    let expected = estimated(folder.path.path()).unwrap();
+    let looked = Looked {
+        seed: AMPLIFIES,
+        folder,
+        expected,
+    };
+    assert_eq!(looked.compared(replayed(&looked.folder), true), Ok(()));
+    let wrong = "const sine = Math.sin; Math.sin = (x) => sine(x) * (1 + 1e-12);";
+    let found = replayed_by(&looked.folder, wrong);
+    let off = looked.compared(found, true).unwrap_err();
+    assert!(off.contains("up to row"), "{off}");
 }
