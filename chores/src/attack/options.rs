@@ -22,6 +22,19 @@ pub struct Options {
     pub folder: PathBuf,
 }
 
+/// The command as `cargo xtask test` has built it. Features of dependencies are those of the whole and of its tests, for which one
+/// test has to be asked for: with others, all of it would be compiled again.
+const AS_TESTED: [&str; 8] = [
+    "build",
+    "--workspace",
+    "--exclude",
+    "chores",
+    "--bin",
+    "lynkeus",
+    "--test",
+    "circles",
+];
+
 impl Options {
     /// Reads `--seed N --count N --seconds N --limit SECONDS --binary FILE`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
@@ -54,13 +67,11 @@ impl Options {
                 .canonicalize()
                 .map_err(|e| format!("{}: {e}", path.display()));
         }
-        let (profile, folder): (&[&str], _) = match cfg!(debug_assertions) {
-            true => (&[], "debug"),
-            false => (&["--release"], "release"),
+        let (build, folder): (&[&str], _) = match cfg!(debug_assertions) {
+            true => (&AS_TESTED, "debug"),
+            false => (&["build", "--release", "-p", "lynkeus-cli"], "release"),
         };
-        run(&mut cargo(
-            &[&["build", "-p", "lynkeus-cli"], profile].concat(),
-        ))?;
+        run(&mut cargo(build))?;
         let name = format!("lynkeus{}", std::env::consts::EXE_SUFFIX);
         Ok(target().join(folder).join(name))
     }

@@ -111,7 +111,6 @@ fn a_short_attack_finds_nothing() {
     let options = Options {
         folder: folder.clone(),
         count: 400,
-        seconds: Some(35),
         ..Options::read(&[]).unwrap()
     };
     let report = super::search(&options).unwrap();

@@ -1,10 +1,10 @@
 //! One case: what the library says of it, and what is wrong with that.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use lynkeus::Study;
-use lynkeus::expr::Budget;
+use lynkeus::expr::{Budget, Memory};
 use lynkeus::observers::Observer;
 use lynkeus::prepare::Prepared;
 use lynkeus::structure::{AugmentedPlant, Standing, range};
@@ -69,8 +69,29 @@ pub struct Effort {
     pub facts: bool,
 }
 
-/// For the tube of a filter, which may be stiff or have many dimensions.
-const LONGEST: Duration = Duration::from_secs(4);
+/// For the tube of a filter, which may be stiff or have many dimensions: most come to their end with half as many.
+const LOOKS: usize = 300;
+
+/// A limit that a seed reproduces, as no clock does: so many looks at it, of which a tube has two or more in each step. It is a
+/// limit of memory, of which some more is in use with every look.
+pub fn so_many_looks(looks: usize) -> Budget {
+    // more than any work asks for at once
+    const LOOK: usize = 1 << 40;
+    thread_local! {
+        static SO_FAR: Cell<usize> = const { Cell::new(0) };
+    }
+    SO_FAR.set(0);
+    let used = || {
+        SO_FAR.set(SO_FAR.get() + 1);
+        SO_FAR.get() * LOOK
+    };
+    let memory = Memory {
+        limit: looks * LOOK,
+        used,
+        before: 0,
+    };
+    Budget::new(None, Some(memory))
+}
 
 /// A folder in which the case is written for the library to read.
 pub struct Desk(PathBuf);
@@ -111,7 +132,7 @@ pub fn judge(
         let mut study = Study::load(&study).map_err(|e| e.to_string())?;
         if case.kind == Kind::Filter {
             // what is proved until then stands
-            study.budget = Budget::new(Some(LONGEST), None);
+            study.budget = so_many_looks(LOOKS);
         }
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;

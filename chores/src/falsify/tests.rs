@@ -7,7 +7,7 @@ use super::case::{Asked, Case, Course, Input, Kind, Noise, Role, Side};
 use super::chance::Counted;
 use super::claims::Claim;
 use super::facts::{Fact, Facts};
-use super::judge::{Desk, attack};
+use super::judge::{Desk, attack, so_many_looks};
 use super::pair::Pair;
 use super::report::Options;
 use crate::numbers::Numbers;
@@ -220,8 +220,8 @@ fn a_witness_that_shows_nothing_is_found() {
     }
 }
 
-/// What is seen of runs of a pendulum's filter, beside its tube with other numbers in it.
-fn filtered(name: &str, change: impl FnOnce(&mut FilterTube)) -> f64 {
+/// A pendulum with a filter.
+fn pendulum() -> Case {
     let mut case = case("-sin(x1) + d");
     case.kind = Kind::Filter;
     case.outputs = vec![vec!["x1".into()]];
@@ -242,6 +242,12 @@ fn filtered(name: &str, change: impl FnOnce(&mut FilterTube)) -> f64 {
     case.key("family", "\"ekf\"");
     case.key("initial", "{ x1 = 0.42, x2 = 0 }");
     case.key("initial_variance", "{ x1 = 0.001, x2 = 0.001 }");
+    case
+}
+
+/// What is seen of runs of the pendulum's filter, beside its tube with other numbers in it.
+fn filtered(name: &str, change: impl FnOnce(&mut FilterTube)) -> f64 {
+    let case = pendulum();
     let folder = std::env::temp_dir().join(format!("lynkeus-{name}-{}", std::process::id()));
     let desk = Desk::new(&folder).unwrap();
     let study = Study::load(desk.write(&case).unwrap()).unwrap();
@@ -289,6 +295,24 @@ fn runs_of_a_filter_leave_a_tube_that_is_too_narrow() {
         filtered("sd", deviation),
     ];
     assert!(found.iter().all(|ratio| *ratio > 1.0), "{found:?}");
+}
+
+#[test]
+fn a_limit_of_looks_ends_a_tube_where_it_ended_before() {
+    let folder = std::env::temp_dir().join(format!("lynkeus-looks-{}", std::process::id()));
+    let desk = Desk::new(&folder).unwrap();
+    let study = Study::load(desk.write(&pendulum()).unwrap()).unwrap();
+    let reached = |looks: usize| {
+        let mut study = study.clone();
+        study.budget = so_many_looks(looks);
+        let tube = lynkeus::certify(&study).unwrap().filter.unwrap();
+        tube.noisy.unwrap().reached
+    };
+    let found = [100, 100, 120, 300].map(reached);
+    std::fs::remove_dir_all(folder).unwrap();
+    assert!(found[0] > 0.0 && found[0] == found[1], "{found:?}");
+    assert!(found[1] < found[2] && found[2] < found[3], "{found:?}");
+    assert_eq!(found[3], 1.5);
 }
 
 /// e' = −(0.5 + k) e + k ν: the error is normal, and as large as the bound says but for the mean of a tail instead of its
@@ -352,5 +376,5 @@ fn a_short_search_finds_no_false_claim() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// One or two minutes.
-const PLANTS: u64 = 120;
+/// Eight of each place in the round of kinds: less than a minute.
+const PLANTS: u64 = 88;
