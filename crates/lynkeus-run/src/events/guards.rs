@@ -436,13 +436,16 @@ impl Search<'_> {
         self.at(samples)
     }
 
-    /// What the values of a step tell, the first such thing before `limit`.
+    /// What the values of a step tell, the first such thing before `limit`, at which something else may come.
     fn among(&self, samples: &[f64], limit: f64) -> Ahead {
         let margins = samples.iter().map(|value| self.side * (value - self.level));
-        let mut before = places()
+        let before = places()
             .zip(margins)
             .take_while(|(place, _)| *place <= limit);
-        let passed = before.find(|(_, margin)| *margin < -self.band);
+        // it may be passed between the last sample and what comes there
+        let last = (limit < 1.0).then_some(limit).into_iter();
+        let last = last.map(|limit| (limit, self.margin(limit)));
+        let passed = before.chain(last).find(|(_, margin)| *margin < -self.band);
         passed.map_or(Ahead::Nothing, |(place, _)| self.jump(place))
     }
 
@@ -570,6 +573,28 @@ impl Poly {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is sampled is passed between two samples, and before something else is: that one comes first.
+    #[test]
+    fn samples_reach_to_what_comes_first() {
+        let g = Graph::new();
+        let s = g.symbol("s");
+        let node = (g.constant(0.5078) - s).node();
+        let mut guard = Guard::new(&g, &[s.node()], &[0], node).unwrap();
+        guard.sampled = Some(0);
+        let path = [Poly::line(0.0, 1.0)];
+        let samples = [places().map(|place| 0.5078 - place).collect()];
+        let until = |limit| guard.passage((&path, &samples), (1.0, 0.0), 0.0, SHORTEST, limit);
+        let Ahead::Jump { at, beyond } = until(0.51) else {
+            panic!("nothing is passed before 0.51");
+        };
+        assert!(
+            (at - 0.5078).abs() < 1e-12 && beyond == 0.51,
+            "{at} {beyond}"
+        );
+        assert_eq!(until(0.507), Ahead::Nothing);
+        assert!(matches!(until(1.0), Ahead::Jump { .. }));
+    }
 
     #[test]
     fn enclosures_hold_what_they_are_of() {
