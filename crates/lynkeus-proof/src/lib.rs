@@ -9,7 +9,7 @@
 //! |---|---|---|
 //! | is a symmetric interval matrix definite? | | [`definite`]: interval Cholesky |
 //! | does e' = A(θ)e decay for every θ(t) in a box? | [`decay::prove`], [`decay::fastest`], [`decay::design`] | [`decay::holds`] |
-//! | does z = Φ(x) of which ∂Φ/∂x is known? | [`decay::fastest_implicit`] | [`decay::holds_implicit`] |
+//! | does z = Φ(x) of which ∂Φ/∂x is known, and what is left of x? | [`decay::fastest_implicit`] | [`decay::holds_implicit`], [`decay::Reach`] |
 //! | has every A of an interval matrix an unstable eigenvalue? | [`lyapunov`], a Schur form | [`decay::is_unstable`] |
 //! | does a chain with bounded partials decay? | [`lyapunov::of_chain`] | [`chain::Chain::decay`], [`elimination`] |
 //! | do coupled chains decay, and to where? | | [`chain::Comparison`], [`chain::ultimate`], by [`metzler`] matrices |

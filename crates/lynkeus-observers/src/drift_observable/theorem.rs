@@ -39,7 +39,7 @@ use super::lipschitz::Lipschitz;
 use super::observer::{Gains, closed_loop, slowest, spread};
 use super::said::Said;
 use super::settings::{Settings, Variant};
-use super::together;
+use super::together::{self, Falling};
 use crate::design::Found;
 use crate::statement::{proved, sufficient, undecided};
 use crate::{
@@ -281,7 +281,7 @@ struct Proof<'a, 'p> {
 
 /// Lyapunov functions, the one that falls fastest first, and what is stated of them.
 struct Forms {
-    P: Vec<Ellipsoid>,
+    P: Vec<Falling>,
     checks: Vec<Check>,
     /// the first is not by the Riccati inequality
     is_together: bool,
@@ -308,6 +308,7 @@ impl Proof<'_, '_> {
             false => &[],
         };
         let found = together::falling(self.augmented, of, A, least, shares)?;
+        let P: Vec<Falling> = P.into_iter().map(Falling::from).collect();
         let Some((faster, parts)) = found else {
             let is_together = false;
             return Ok(Forms {
@@ -316,7 +317,7 @@ impl Proof<'_, '_> {
                 is_together,
             });
         };
-        let rate = faster.first().map_or(0.0, |P| P.α);
+        let rate = faster.first().map_or(0.0, |found| found.P.α);
         Ok(Forms {
             P: [faster, P].concat(),
             checks: vec![proved(Germani::OneFunction, Said::Falls { rate, parts })],
@@ -412,8 +413,8 @@ impl Proof<'_, '_> {
     }
 
     /// Rate, peak and bounds as t → ∞, where every hypothesis is proved.
-    fn conclude(&self, P: &[Ellipsoid], assumptions: &Assumptions, found: &mut Certificate) {
-        let fastest = &P[0];
+    fn conclude(&self, P: &[Falling], assumptions: &Assumptions, found: &mut Certificate) {
+        let Falling { P: fastest, reach } = &P[0];
         let (gains, lipschitz) = (self.gains, self.lipschitz);
         let filtered = self.form.variant == Variant::Practical && self.w.iter().any(|&w| w > 0.0)
             || gains.K2.iter().any(|K| !K.is_empty());
@@ -425,6 +426,8 @@ impl Proof<'_, '_> {
         }
         found.rate = Some(filter.as_ref().map_or(fastest.α, |f| fastest.α.min(f.α)));
         let μ = times(times(fastest.peak(), lipschitz.map), lipschitz.inverse);
+        let reached = reach.as_ref().map(|reach| times(reach.form, reach.whole));
+        let μ = reached.map_or(μ, |reached| reached.min(μ));
         // with a filter the error peaks by what the filter's leaves as well
         found.overshoot = filter.is_none().then_some(μ);
         self.print(fastest, μ, filter.as_ref(), &mut found.constants);
@@ -437,8 +440,8 @@ impl Proof<'_, '_> {
     }
 
     /// Bounds as t → ∞ by P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and
-    /// |e_z,j| ≤ √(P_jj ν).
-    fn left(&self, P: &Ellipsoid, a: f64, assumptions: &Assumptions) -> Bounds {
+    /// |e_z,j| ≤ √(P_jj ν). Without a filter [`Reach`](lynkeus_proof::decay::Reach) bounds e_x itself.
+    fn left(&self, Falling { P, reach }: &Falling, a: f64, assumptions: &Assumptions) -> Bounds {
         let found = self.lipschitz;
         let f = size(of_rows(P, &found.unseen)) + size(self.forces(P, assumptions));
         let twice = Interval::point(2.0) * Interval::point(P.α);
@@ -453,8 +456,15 @@ impl Proof<'_, '_> {
             plus(one_by_one.min(together), times(*of_a, a))
         };
         let each = found.of_z.iter().zip(&found.of_a);
-        let each: Vec<f64> = each.map(of_state).collect();
-        let norm = times(found.inverse, length(&[e_z, a])).min(length(&each));
+        let mut each: Vec<f64> = each.map(of_state).collect();
+        let mut norm = times(found.inverse, length(&[e_z, a])).min(length(&each));
+        if let Some(reach) = reach {
+            let by_form = |times: &f64| (Interval::point(*times) * root_ν).hi();
+            for (bound, times) in each.iter_mut().zip(&reach.entries) {
+                *bound = bound.min(by_form(times));
+            }
+            norm = norm.min(by_form(&reach.whole)).min(length(&each));
+        }
         let names = self.augmented.states.iter().map(|x| x.name.clone());
         let states = names.zip(each).map(UltimateBound::from).collect();
         Bounds { norm, states }
@@ -527,7 +537,7 @@ impl Proof<'_, '_> {
         add("λmin(P)", P.smallest, "smallest eigenvalue of P");
         add("α", P.α, "the rate that P proves");
         let Some(filter) = filter else {
-            let meaning = "√cn(P) γ_Φ γ_Φ⁻¹: the factor by which the error may peak";
+            let meaning = "the factor by which the error may peak: √cn(P) γ_Φ γ_Φ⁻¹, or less";
             return add("μ", μ, meaning);
         };
         let (root, α) = (Interval::point(P.largest).sqrt(), Interval::point(P.α));

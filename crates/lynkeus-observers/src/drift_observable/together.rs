@@ -3,8 +3,8 @@
 //! With means over the segment from estimate to truth e_z' = (A − KC) e_z + ã e and e_z = Q̃ e. The Riccati inequality
 //! knows of ãQ̃⁻¹ how large it is; here it is what it is at every point of the box ([`lynkeus_proof::decay::fastest_implicit`]).
 
-use lynkeus_expr::Node;
-use lynkeus_proof::decay::{fastest_implicit, prove_implicit};
+use lynkeus_expr::{Budget, Node};
+use lynkeus_proof::decay::{Field, ImplicitProof, Reach, fastest_implicit, prove_implicit};
 use lynkeus_proof::ellipsoid::Ellipsoid;
 use lynkeus_proof::magnitude::{times, total};
 use lynkeus_structure::{AugmentedPlant, Matrix};
@@ -20,7 +20,22 @@ use crate::field::Joint;
 /// The share of the time that is left in which a proof is sought.
 const SEARCH: f64 = 0.5;
 
-/// V = e_zᵀP⁻¹e_z for the closed loop A − KC: the fastest that is found to fall faster than at a rate, then some that fall at
+/// V = e_zᵀP⁻¹e_z that falls.
+#[derive(Clone)]
+pub(super) struct Falling {
+    /// P and its rate
+    pub P: Ellipsoid,
+    /// what it says of e_x, where more is proved than by the Lipschitz constants of the map
+    pub reach: Option<Reach>,
+}
+
+impl From<Ellipsoid> for Falling {
+    fn from(P: Ellipsoid) -> Self {
+        Self { P, reach: None }
+    }
+}
+
+/// V for the closed loop A − KC: the fastest that is found to fall faster than at a rate, then some that fall at
 /// shares of its rate, with the number of parts that the first one needed. None where nothing is found, and for (4.22),
 /// whose filter has an error of its own.
 pub(super) fn falling(
@@ -29,7 +44,7 @@ pub(super) fn falling(
     A: &DMatrix<f64>,
     least: f64,
     shares: &[f64],
-) -> Result<Option<(Vec<Ellipsoid>, usize)>, DesignError> {
+) -> Result<Option<(Vec<Falling>, usize)>, DesignError> {
     if form.variant == Variant::Practical && form.has_inputs() {
         return Ok(None);
     }
@@ -40,16 +55,18 @@ pub(super) fn falling(
     let sizes = sizes(augmented, &found.Q);
     Ok(joint.field(|field| {
         let (proof, parts) = fastest_implicit(field, &sizes, least, &search)?;
-        let mut P = vec![proof.ellipsoid()?];
         let slower = |share: &f64| prove_implicit(field, &sizes, share * proof.rate, &search);
-        P.extend(
-            shares
-                .iter()
-                .filter_map(slower)
-                .filter_map(|(P, _)| P.ellipsoid()),
-        );
-        Some((P, parts))
+        let mut all = vec![of_proof(&proof, field, &search)?];
+        let slower = shares.iter().filter_map(slower);
+        all.extend(slower.filter_map(|(proof, _)| of_proof(&proof, field, &search)));
+        Some((all, parts))
     }))
+}
+
+fn of_proof(proof: &ImplicitProof, field: &Field<'_>, budget: &Budget) -> Option<Falling> {
+    let P = proof.ellipsoid()?;
+    let reach = Reach::of(field, &P, budget);
+    Some(Falling { P, reach })
 }
 
 /// [F R; −I Q] with F = A − KC and R the slopes of the remainder; none where these depend on too much.

@@ -128,11 +128,25 @@ fn form(P: &DMatrix<f64>, N: &DMatrix<f64>, rate: f64, A: &IntervalMatrix) -> Op
         true => twice * Interval::point(P[(i, j)]),
         false => Interval::ZERO,
     });
-    let middle = &left * numbers(A) * &right;
-    let falling_by = DMatrix::from_fn(2 * n, 2 * n, |i, j| falling[i][j].midpoint());
-    let value = -(&middle + middle.transpose() + falling_by);
+    form_of([&left, &right], &falling, A)
+}
+
+/// D + He(L A R) in axes in which it is −1 for the given A; none where it is not negative there.
+pub(super) fn form_of(
+    [L, R]: [&DMatrix<f64>; 2],
+    D: &IntervalMatrix,
+    A: &IntervalMatrix,
+) -> Option<Form> {
+    let middle = L * numbers(A) * R;
+    let value = -(&middle + middle.transpose() + numbers(D));
     let T = value.cholesky()?.l().transpose().try_inverse()?;
-    Some(Form::of([&left, &right], &falling, &T))
+    Some(Form::of([L, R], D, &T))
+}
+
+/// F, R, −I and Q, in numbers.
+pub(super) fn blocks(A: &IntervalMatrix) -> [DMatrix<f64>; 4] {
+    let (n, A) = (A.len() / 2, numbers(A));
+    [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| A.view((i * n, j * n), (n, n)).into_owned())
 }
 
 fn numbers(A: &IntervalMatrix) -> DMatrix<f64> {
@@ -141,10 +155,8 @@ fn numbers(A: &IntervalMatrix) -> DMatrix<f64> {
 
 /// F + R Q⁻¹
 fn explicit(A: &IntervalMatrix) -> Option<DMatrix<f64>> {
-    let n = A.len() / 2;
-    let A = numbers(A);
-    let block = |i: usize, j: usize| A.view((i * n, j * n), (n, n)).into_owned();
-    let found = block(0, 0) + block(0, 1) * block(1, 1).try_inverse()?;
+    let [F, R, _, Q] = blocks(A);
+    let found = F + R * Q.try_inverse()?;
     found.iter().all(|entry| entry.is_finite()).then_some(found)
 }
 
@@ -186,8 +198,8 @@ fn proposed(
     budget: &Budget,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let n = frame.sizes.len();
-    let block = |A: &DMatrix<f64>, i: usize, j: usize| A.view((i * n, j * n), (n, n)).into_owned();
-    let Y = block(&numbers(given.first()?), 1, 1).try_inverse()?;
+    let [_, _, _, Q] = blocks(given.first()?);
+    let Y = Q.try_inverse()?;
     let (W, inverse) = frame.widened(&[]);
     let YW = &Y * &W;
     let mut problem = Problem::new(budget);
@@ -199,10 +211,10 @@ fn proposed(
         if problem.is_spent() {
             return None;
         }
-        let A = numbers(A);
-        let F = &inverse * block(&A, 0, 0) * &W * frame.unit;
-        let R = &inverse * block(&A, 0, 1) * &YW * frame.unit;
-        let Q = &inverse * block(&A, 1, 1) * &YW;
+        let [F, R, _, Q] = blocks(A);
+        let F = &inverse * F * &W * frame.unit;
+        let R = &inverse * R * &YW * frame.unit;
+        let Q = &inverse * Q * &YW;
         let of_z = S.times(&F).minus(&N1).he();
         let of_z = of_z.plus(&S.scaled(2.0 * rate * frame.unit));
         let mixed = S.times(&R).plus(&N1.times(&Q)).minus(&N2.transposed());

@@ -219,7 +219,7 @@ pub(super) fn in_the_middle(field: &Field<'_>) -> IntervalMatrix {
     (field.on)(&points_of(&middle(&field.sides)))
 }
 
-fn points_of(point: &[f64]) -> Vec<Interval> {
+pub(super) fn points_of(point: &[f64]) -> Vec<Interval> {
     point.iter().map(|&x| Interval::point(x)).collect()
 }
 

@@ -1,8 +1,10 @@
 //! Decay in coordinates of which only the Jacobian is known, at means over random segments.
 
 use lynkeus_expr::{Budget, Interval};
-use lynkeus_proof::decay::{Covered, Field, ImplicitProof, fastest_implicit, holds_implicit};
-use nalgebra::{DMatrix, Matrix2};
+use lynkeus_proof::decay::{
+    Covered, Field, ImplicitProof, Reach, fastest_implicit, holds_implicit,
+};
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use super::{Random, largest};
 
@@ -54,8 +56,8 @@ impl Plant {
         ]
     }
 
-    /// F + R̃Q̃⁻¹ for the means over a segment: Simpson's rule is exact for these polynomials.
-    fn mean(&self, from: [f64; 2], to: [f64; 2]) -> Matrix2<f64> {
+    /// F + R̃Q̃⁻¹ and Q̃ for the means over a segment: Simpson's rule is exact for these polynomials.
+    fn mean(&self, from: [f64; 2], to: [f64; 2]) -> [Matrix2<f64>; 2] {
         let mut sum = DMatrix::<f64>::zeros(4, 4);
         for (t, weight) in [(0.0, 1.0), (0.5, 4.0), (1.0, 1.0)] {
             let x = [0, 1].map(|i| Interval::point(from[i] + t * (to[i] - from[i])));
@@ -63,7 +65,8 @@ impl Plant {
             sum += DMatrix::from_fn(4, 4, |i, j| A[i][j].midpoint()) * (weight / 6.0);
         }
         let block = |i: usize, j: usize| Matrix2::from_fn(|k, l| sum[(2 * i + k, 2 * j + l)]);
-        block(0, 0) + block(0, 1) * block(1, 1).try_inverse().unwrap()
+        let Q = block(1, 1);
+        [block(0, 0) + block(0, 1) * Q.try_inverse().unwrap(), Q]
     }
 }
 
@@ -89,7 +92,7 @@ fn faster(field: &Field<'_>, proof: &ImplicitProof) -> ImplicitProof {
 #[test]
 fn implicit_decay_stands_means_over_segments() {
     let mut random = Random::new(7);
-    let (mut proved, mut tight) = (0, 0);
+    let (mut proved, mut tight, mut near) = (0, 0, 0);
     for _ in 0..24 {
         let plant = Plant::random(&mut random);
         let on = |part: &[Interval]| plant.matrix(part);
@@ -107,16 +110,39 @@ fn implicit_decay_stands_means_over_segments() {
         let hardest = faster(&field, &found);
         let P = Matrix2::from_fn(|i, j| hardest.P[(i, j)]);
         let mut worst = f64::NEG_INFINITY;
+        let inverse = P.try_inverse().unwrap();
+        let ellipsoid = found.ellipsoid().unwrap();
+        let reach = Reach::of(&field, &ellipsoid, &Budget::default()).unwrap();
+        let mut reached = [0.0_f64; 4];
         for _ in 0..2000 {
             let [from, to] = [0, 1].map(|_| [0, 1].map(|_| random.of_range(-1.0, 1.0)));
-            let A = plant.mean(from, to);
+            let [A, Q] = plant.mean(from, to);
             // of V = eᵀP⁻¹e in the coordinates P⁻¹e
             let form = A * P + P * A.transpose() + P * (2.0 * hardest.rate);
             let form = DMatrix::from_fn(2, 2, |i, j| form[(i, j)] / (P[(i, i)] * P[(j, j)]).sqrt());
             worst = worst.max(largest(&form));
+            for e in [[to[0] - from[0], to[1] - from[1]], [1.0, 0.0], [0.0, 1.0]] {
+                let e = Vector2::from(e);
+                let root = (Q * e).dot(&(inverse * Q * e)).sqrt();
+                let sizes = [
+                    root / (reach.form * e.norm()),
+                    e.norm() / (reach.whole * root),
+                    e[0].abs() / (reach.entries[0] * root),
+                    e[1].abs() / (reach.entries[1] * root),
+                ];
+                // a segment of one point has no size
+                for (most, size) in reached.iter_mut().zip(sizes) {
+                    *most = most.max(size);
+                }
+            }
         }
+        assert!(reached.iter().all(|most| *most <= 1.0), "{reached:?}");
+        near += usize::from(reached.iter().all(|most| *most > 0.5));
         assert!(worst < 1e-10, "{worst:e} at {}", hardest.rate);
         tight += usize::from(worst > -0.3 * hardest.rate);
     }
-    assert!(proved >= 10 && tight >= 3, "{proved} {tight}");
+    assert!(
+        proved >= 10 && tight >= 3 && 2 * near > proved,
+        "{proved} {tight} {near}"
+    );
 }
