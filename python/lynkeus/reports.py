@@ -36,11 +36,11 @@ __all__ = [
     "DesignReport",
     "Doubt",
     "Ended",
+    "ErrorRow",
+    "ErrorTube",
     "Excitation",
     "Excursion",
     "FamilyFit",
-    "FilterRow",
-    "FilterTube",
     "FitEntries",
     "FitReport",
     "FittedErrors",
@@ -676,7 +676,7 @@ class Tube(Record):
         return found
 
 
-class FilterRow(Record):
+class ErrorRow(Record):
     """A part of it."""
 
     to: float
@@ -684,7 +684,7 @@ class FilterRow(Record):
     error: Named[Range]
     """ranges of estimate minus truth"""
     deviation: Named[Range]
-    """ranges of the filter's own standard deviations"""
+    """ranges of a filter's own standard deviations"""
     _ITEMS: ClassVar = {"from": float}
 
     @property
@@ -695,7 +695,7 @@ class FilterRow(Record):
 
 
 class FollowedEntry(Record):
-    """The error and the filter's own standard deviations along a tube."""
+    """The error, and a filter's own standard deviations, along a tube."""
 
     reached: float
     """until when the ranges are proved"""
@@ -704,28 +704,30 @@ class FollowedEntry(Record):
     error_end: Named[Range]
     """the same at the end of it"""
     deviation: Named[Range]
-    """ranges of the filter's own standard deviations over all of the time"""
+    """ranges of a filter's own standard deviations over all of the time; empty for other observers"""
     deviation_end: Named[Range]
     """the same at the end of it"""
-    rows: list[FilterRow]
-    """both from one time to the next"""
+    monitors: Named[Range]
+    """ranges of the observer's monitors over all of the time, where they have bounds"""
+    rows: list[ErrorRow]
+    """errors and deviations from one time to the next"""
 
 
-class FilterTube(Record):
-    """What is proved of an extended Kalman filter from a set of starts."""
+class ErrorTube(Record):
+    """What is proved of the error of an observer or of an extended Kalman filter from a set of starts."""
 
     verdict: Verdict
     """whether the error has the bounds until the time asked for"""
     until: float
     """until when it is asked"""
     every: float | None
-    """the time from one sample to the next"""
+    """the time from one sample to the next; ``None`` where sensors are read continuously"""
     start: Named[Range]
     """ranges of plant states and unknown inputs at the start"""
     estimate: Named[float]
     """where the estimate starts"""
     readings: Named[float]
-    """bounds of the errors of readings, by output"""
+    """bounds of the errors of readings, by output; of relative noise as a share of what is shown"""
     inputs: Named[Range]
     """ranges of inputs that may vary as they like"""
     noisy: FollowedEntry | None
@@ -814,8 +816,8 @@ class Proof(Record):
     "predict"``); ``None`` where nothing is proved of sensors that are read continuously"""
     tube: Tube | None
     """whether the plant stays in the box from the starts of ``[certify]``; ``None`` where that is not asked"""
-    filter: FilterTube | None
-    """what is proved of an extended Kalman filter from these starts; null for other observers"""
+    error_tube: ErrorTube | None
+    """what is proved of the observer's error from these starts; ``None`` where that is not asked"""
     notes: list[str]
     """what you should know"""
     theorem: ProofSummary | None

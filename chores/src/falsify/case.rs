@@ -141,13 +141,15 @@ impl Wave {
     }
 }
 
-/// The run that a filter is followed along.
+/// The run that a filter or an observer is followed along.
 #[derive(Clone, Debug)]
 pub struct Course {
     /// from sample to sample
     pub every: f64,
     /// the known inputs by their names
     pub known: Vec<(String, Wave)>,
+    /// whether an observer's measurements follow the model between samples
+    pub is_predicted: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -168,7 +170,7 @@ pub struct Case {
     pub slope: Option<f64>,
     /// what is asked about its tube
     pub tube: Option<Asked>,
-    /// of a filter
+    /// of a filter, and of an observer that is followed
     pub course: Option<Course>,
     /// key and value of `[observer]`
     pub observer: Vec<(String, String)>,
@@ -291,7 +293,7 @@ impl Case {
         text
     }
 
-    /// What a filter is followed along: the study's own simulation.
+    /// What it is followed along: the study's own simulation.
     fn write_course(&self, text: &mut String) {
         let (Some(course), Some(asked)) = (&self.course, &self.tube) else {
             return;
@@ -310,7 +312,10 @@ impl Case {
         if !inputs.is_empty() {
             _ = writeln!(text, "inputs = {{ {} }}", inputs.join(", "));
         }
-        // a filter is compared with what is said of it in exact arithmetic
+        // it is compared with what is said of it in exact arithmetic
         text.push_str("\n[estimate]\nrtol = 1e-11\natol = 1e-14\n");
+        if course.is_predicted {
+            text.push_str("between_samples = \"predict\"\n");
+        }
     }
 }

@@ -7,7 +7,7 @@ use lynkeus::observers::{
 };
 use lynkeus::prepare::{Prepared, StudyDesign};
 use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
-use lynkeus::{FilterTube, Tube};
+use lynkeus::{ErrorTube, Tube};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -50,8 +50,8 @@ pub struct Findings {
     pub sampled: Option<(Claim, f64, bool)>,
     /// where the plant is from the starts that the study asks about
     pub tube: Option<Tube>,
-    /// what is said of the filter's error from there
-    pub filter: Option<FilterTube>,
+    /// what is said of the observer's error from there
+    pub error_tube: Option<ErrorTube>,
     pub refutations: Vec<Refutation>,
     /// the family that the study asks for
     pub examination: Option<Examination>,
@@ -103,9 +103,9 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
         Some((claim, longest.interval, sampled.together))
     });
     found.tube = report.tube;
-    found.filter = report.filter;
-    let filter = found.filter.as_ref().map(|f| f.verdict);
-    found.counts.proved += usize::from(filter == Some(Standing::Proved));
+    found.error_tube = report.error_tube;
+    let error = found.error_tube.as_ref().map(|tube| tube.verdict);
+    found.counts.proved += usize::from(error == Some(Standing::Proved));
     found.certified(report.certificate, true);
     if let Some(theorem) = report.theorem {
         found.certified(theorem, false);
@@ -128,7 +128,7 @@ impl Findings {
             claims: vec![],
             sampled: None,
             tube: None,
-            filter: None,
+            error_tube: None,
             refutations: vec![],
             examination: examinations.ok().and_then(|all| all.last().cloned()),
             contradicts: false,

@@ -13,8 +13,8 @@ use super::attack::Attack;
 use super::case::{Case, Kind, Role};
 use super::chance;
 use super::claims::{self, Findings};
+use super::error;
 use super::facts::{self, Fact, Facts};
-use super::filter;
 use super::pair::Pair;
 use super::refute;
 use super::retune;
@@ -35,8 +35,8 @@ pub enum Flaw {
     Contradiction,
     /// the gain that is printed is not the observer's
     Gain,
-    /// a filter's error or deviation leaves its tube
-    Filter,
+    /// an error, or a filter's deviation, leaves its tube
+    Error,
     /// too many runs are beyond a bound with a probability
     Chance,
     /// a run leaves the tube, or the witness of one that leaves the box does not
@@ -59,7 +59,7 @@ pub struct Violation {
 pub struct Effort {
     /// simulations per proof
     pub runs: usize,
-    /// quantities of a filter that are driven to their ends
+    /// errors and deviations that are driven to their ends
     pub targets: usize,
     /// conditions of all families instead of the study's
     pub thorough: bool,
@@ -69,8 +69,9 @@ pub struct Effort {
     pub facts: bool,
 }
 
-/// For the tube of a filter, which may be stiff or have many dimensions: most come to their end with half as many.
-const LOOKS: usize = 300;
+/// For the tube of a filter, which may be stiff or have many dimensions: most come to their end with half as many. And for
+/// that of an observer, beside which the gain is proved, too.
+const LOOKS: [usize; 2] = [300, 6000];
 
 /// A limit that a seed reproduces, as no clock does: so many looks at it, of which a tube has two or more in each step. It is a
 /// limit of memory, of which some more is in use with every look.
@@ -130,9 +131,9 @@ pub fn judge(
     for round in 0..3 {
         let study = desk.write(&case).map_err(|e| e.to_string())?;
         let mut study = Study::load(&study).map_err(|e| e.to_string())?;
-        if case.kind == Kind::Filter {
+        if case.course.is_some() {
             // what is proved until then stands
-            study.budget = so_many_looks(LOOKS);
+            study.budget = so_many_looks(LOOKS[usize::from(case.kind != Kind::Filter)]);
         }
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
@@ -156,7 +157,7 @@ pub fn judge(
         looked.everything(&study, numbers);
         let (counts, violations) = (looked.counts, looked.violations);
         let simulated = effort.facts && !effort.refutations_only;
-        let simulated = simulated && case.kind != Kind::Filter;
+        let simulated = simulated && case.course.is_none();
         if violations.is_empty() && simulated && found.fits() && numbers.chance(0.15) {
             let mut judgement = Judgement {
                 counts,
@@ -205,8 +206,8 @@ impl Look<'_, '_> {
             self.against_samples(&design.observer, numbers);
         }
         self.against_tube(numbers);
+        self.against_error(study, numbers);
         if is_filter {
-            self.against_filter(study, numbers);
             self.witnesses();
             self.counts.violated = usize::from(!self.violations.is_empty());
             return;
@@ -283,9 +284,10 @@ impl Look<'_, '_> {
         }
     }
 
-    /// Runs of the study's own filter.
-    fn against_filter(&mut self, study: &Study, numbers: &mut Numbers) {
-        let Some(tube) = &self.found.filter else {
+    /// Runs of the study's own filter or observer.
+    fn against_error(&mut self, study: &Study, numbers: &mut Numbers) {
+        let tube = self.found.error_tube.as_ref();
+        let Some(tube) = tube.filter(|_| self.case.course.is_some()) else {
             return;
         };
         let mut study = study.clone();
@@ -295,17 +297,17 @@ impl Look<'_, '_> {
             let Some(followed) = followed.as_ref().filter(|f| f.reached > tube.from) else {
                 continue;
             };
-            let attack = filter::Attack::new(self.case, &study, self.augmented, tube, is_exact);
+            let attack = error::Attack::new(self.case, &study, self.augmented, tube, is_exact);
             let worst = match attack {
                 Ok(mut attack) => attack.search(numbers, self.effort.targets),
-                Err(missing) => return self.note(Flaw::Filter, missing),
+                Err(missing) => return self.note(Flaw::Error, missing),
             };
             if worst.is_whole && !is_exact {
-                self.counts.filters += 1;
+                self.counts.errors += 1;
                 self.counts.bounded += usize::from(followed.reached >= tube.until);
             }
             if worst.ratio > 1.0 {
-                self.note(Flaw::Filter, worst.what);
+                self.note(Flaw::Error, worst.what);
             }
         }
     }

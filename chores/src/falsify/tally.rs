@@ -28,8 +28,8 @@ pub struct Counts {
     /// tubes that were attacked, and those of them that stay in the box
     pub tubes: usize,
     pub stay: usize,
-    /// filters' tubes that were attacked, and those of them that are proved to their end
-    pub filters: usize,
+    /// tubes of errors that were attacked, and those of them that are proved to their end
+    pub errors: usize,
     pub bounded: usize,
     /// bounds with a probability of which runs were counted
     pub probable: usize,
@@ -58,7 +58,7 @@ impl Counts {
         self.sampled_together += other.sampled_together;
         self.tubes += other.tubes;
         self.stay += other.stay;
-        self.filters += other.filters;
+        self.errors += other.errors;
         self.bounded += other.bounded;
         self.probable += other.probable;
         self.violated += other.violated;
@@ -85,7 +85,7 @@ impl Tally {
 
     /// A table in Markdown.
     pub fn table(&self) -> String {
-        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | samples together | tubes | that stay | filters | to their end | in probability | violated | witnesses checked | wrong |\n\
+        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | of samples | together | samples together | tubes | that stay | errors | to their end | in probability | violated | witnesses checked | wrong |\n\
                         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
         let rows = self.0.iter().map(|(kind, counts)| (kind.word(), counts));
@@ -104,7 +104,7 @@ impl Tally {
                 c.sampled_together,
                 c.tubes,
                 c.stay,
-                c.filters,
+                c.errors,
                 c.bounded,
                 c.probable,
                 c.violated,

@@ -14,7 +14,7 @@ use crate::numbers::Numbers;
 use lynkeus::expr::Interval;
 use lynkeus::prepare::Prepared;
 use lynkeus::structure::Standing;
-use lynkeus::{FilterTube, Study, Tube, Witness};
+use lynkeus::{ErrorTube, Study, Tube, Witness};
 
 fn side(name: &str, low: f64, high: f64) -> Side {
     Side {
@@ -237,6 +237,7 @@ fn pendulum() -> Case {
     case.course = Some(Course {
         every: 0.15,
         known: vec![],
+        is_predicted: false,
     });
     case.observer.clear();
     case.key("family", "\"ekf\"");
@@ -245,19 +246,18 @@ fn pendulum() -> Case {
     case
 }
 
-/// What is seen of runs of the pendulum's filter, beside its tube with other numbers in it.
-fn filtered(name: &str, change: impl FnOnce(&mut FilterTube)) -> f64 {
-    let case = pendulum();
+/// What is seen of runs of a case's filter or observer, beside the tube of its error with other numbers in it.
+fn followed(case: &Case, name: &str, change: impl FnOnce(&mut ErrorTube)) -> f64 {
     let folder = std::env::temp_dir().join(format!("lynkeus-{name}-{}", std::process::id()));
     let desk = Desk::new(&folder).unwrap();
-    let study = Study::load(desk.write(&case).unwrap()).unwrap();
+    let study = Study::load(desk.write(case).unwrap()).unwrap();
     let plant = lynkeus::prepare::plant(&study).unwrap();
     let prepared = Prepared::new(&study, &plant).unwrap();
-    let mut tube = lynkeus::certify(&study).unwrap().filter.unwrap();
+    let mut tube = lynkeus::certify(&study).unwrap().error_tube.unwrap();
     assert_eq!(tube.verdict, Standing::Proved);
     change(&mut tube);
     let mut attack =
-        super::filter::Attack::new(&case, &study, prepared.augmented(), &tube, false).unwrap();
+        super::error::Attack::new(case, &study, prepared.augmented(), &tube, false).unwrap();
     let worst = attack.search(&mut Numbers::new(5, 0), 6);
     std::fs::remove_dir_all(folder).unwrap();
     assert!(worst.is_whole || worst.ratio > 1.0);
@@ -272,29 +272,66 @@ fn tenth_less(range: &mut Interval) {
 
 #[test]
 fn runs_of_a_filter_leave_a_tube_that_is_too_narrow() {
-    let ratio = filtered("filter", |_| {});
+    let ratio = followed(&pendulum(), "filter", |_| {});
     assert!(ratio <= 1.0 && ratio > 0.97, "{ratio}");
-    let end = |tube: &mut FilterTube| {
+    let end = |tube: &mut ErrorTube| {
         let noisy = tube.noisy.as_mut().unwrap();
         noisy.error_end.iter_mut().for_each(tenth_less);
     };
-    let rows = |tube: &mut FilterTube| {
+    let rows = |tube: &mut ErrorTube| {
         let noisy = tube.noisy.as_mut().unwrap();
         let rows = noisy.rows[135..165].iter_mut();
         rows.for_each(|row| row.2[..2].iter_mut().for_each(narrower));
     };
-    let deviation = |tube: &mut FilterTube| {
+    let deviation = |tube: &mut ErrorTube| {
         let noisy = tube.noisy.as_mut().unwrap();
         for range in &mut noisy.deviation_end {
             *range = Interval::new(1.0005 * range.hi(), 1.01 * range.hi()).unwrap();
         }
     };
     let found = [
-        filtered("end", end),
-        filtered("rows", rows),
-        filtered("sd", deviation),
+        followed(&pendulum(), "end", end),
+        followed(&pendulum(), "rows", rows),
+        followed(&pendulum(), "sd", deviation),
     ];
     assert!(found.iter().all(|ratio| *ratio > 1.0), "{found:?}");
+}
+
+#[test]
+fn runs_of_an_observer_leave_a_tube_that_is_too_narrow() {
+    let mut case = case("-sin(x1) + d");
+    case.kind = Kind::Triangular;
+    case.outputs = vec![vec!["x1".into()]];
+    case.noise[0] = Noise {
+        size: 0.004,
+        is_uniform: true,
+    };
+    case.tube = Some(Asked {
+        start: vec![side("x1", 0.4, 0.44), side("x2", -0.02, 0.02)],
+        until: 1.5,
+    });
+    case.observer.clear();
+    case.key("family", "\"triangular\"");
+    case.key("theta", "3");
+    case.key("initial", "{ x1 = 0.42, x2 = 0.1 }");
+    let narrow = |tube: &mut ErrorTube| {
+        let noisy = tube.noisy.as_mut().unwrap();
+        // a tube has some room for what varies between samples, which counts step by step
+        for _ in 0..3 {
+            noisy.error_end.iter_mut().for_each(tenth_less);
+        }
+    };
+    for is_predicted in [false, true] {
+        case.course = Some(Course {
+            every: 0.05,
+            known: vec![],
+            is_predicted,
+        });
+        let found = followed(&case, "observer", |_| {});
+        assert!(found <= 1.0 && found > 0.95, "{is_predicted}: {found}");
+        let found = followed(&case, "narrow", narrow);
+        assert!(found > 1.0, "{is_predicted}: {found}");
+    }
 }
 
 #[test]
@@ -305,7 +342,7 @@ fn a_limit_of_looks_ends_a_tube_where_it_ended_before() {
     let reached = |looks: usize| {
         let mut study = study.clone();
         study.budget = so_many_looks(looks);
-        let tube = lynkeus::certify(&study).unwrap().filter.unwrap();
+        let tube = lynkeus::certify(&study).unwrap().error_tube.unwrap();
         tube.noisy.unwrap().reached
     };
     let found = [100, 100, 120, 300].map(reached);

@@ -16,16 +16,16 @@ use lynkeus_experiment::{prepare, words};
 
 mod assumptions;
 mod bounds;
+mod error;
 mod excited;
-mod filter;
 mod json;
 mod print;
 mod sampled;
 mod strays;
 mod tube;
 
+pub use error::{ErrorTube, Followed, Reading};
 pub use excited::{AtTheta, Excitation, Excited};
-pub use filter::{FilterTube, Followed};
 pub(crate) use json::Proof;
 #[cfg(test)]
 pub(crate) use json::Report as CertificateReport;
@@ -64,8 +64,8 @@ pub struct CertifyReport {
     pub excited: Option<Excited>,
     /// whether the plant stays in the box, from the starts that the study asks about
     pub tube: Option<Tube>,
-    /// what is proved of an extended Kalman filter from these starts
-    pub filter: Option<FilterTube>,
+    /// what is proved of the observer's error from these starts
+    pub error_tube: Option<ErrorTube>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -180,14 +180,14 @@ impl<'a> Task<'a> {
         let of_samples = sampled.as_ref().is_some_and(|s: &Result<SampledDecay, _>| {
             s.as_ref().is_ok_and(|found| found.at.is_some())
         });
-        let filter = match self.explore {
-            true => FilterTube::of(&self.prepared, place, &self.study.observer.tuning)?,
+        let error_tube = match self.explore {
+            true => ErrorTube::of(&self.prepared, place, &self.study.observer.tuning)?,
             false => None,
         };
         let of_samples = of_samples
-            || filter
+            || error_tube
                 .as_ref()
-                .is_some_and(|filter| filter.verdict == Standing::Proved);
+                .is_some_and(|tube| tube.every.is_some() && tube.verdict == Standing::Proved);
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
             declared: account(self.prepared.declared(), in_mean_square, of_samples),
@@ -199,7 +199,7 @@ impl<'a> Task<'a> {
                 true => Tube::of(&self.prepared, place)?,
                 false => None,
             },
-            filter,
+            error_tube,
             design,
             certificate,
             notes,

@@ -82,8 +82,8 @@ mod export;
 mod answers_schema;
 
 pub use certify::{
-    AtTheta, CertifyReport, Excitation, Excited, FilterTube, Followed, Strays, Tube, Witness,
-    certify,
+    AtTheta, CertifyReport, ErrorTube, Excitation, Excited, Followed, Reading, Strays, Tube,
+    Witness, certify,
 };
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
 pub use design::{DesignReport, design};

@@ -34,11 +34,15 @@ pub fn case(numbers: &mut Numbers, kind: Kind) -> Case {
         case.tube = Some(asked(draft.numbers, &case, most));
     }
     settings::choose(draft.numbers, &mut case);
+    if !is_filter && draft.numbers.chance(FOLLOWED) {
+        settings::followed(draft.numbers, &mut case);
+    }
     case
 }
 
-/// The share of the studies that ask for a tube.
+/// The share of the studies that ask for a tube, and of those of them that say along which samples.
 const TUBES: f64 = 0.3;
+const FOLLOWED: f64 = 0.7;
 
 /// Where the plant may start, about the middle of the box, and for how long: unknown constants where they are declared,
 /// or in a part of that.

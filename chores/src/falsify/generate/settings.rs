@@ -1,6 +1,6 @@
 //! Settings of `[observer]` for random plants.
 
-use super::super::case::{Case, Course, Input, Kind, Noise, Role, Side, Wave};
+use super::super::case::{Asked, Case, Course, Input, Kind, Noise, Role, Side, Wave};
 use super::terms::round;
 use crate::numbers::Numbers;
 
@@ -123,33 +123,19 @@ fn filter(numbers: &mut Numbers, case: &mut Case) {
     let Some(asked) = case.tube.clone() else {
         return;
     };
-    let unknown = |i: &&Input| matches!(i.role, Role::Unknown(_));
-    let unknown = case.inputs.iter().filter(unknown).map(|i| i.side.clone());
-    let sides: Vec<Side> = case.states.iter().cloned().chain(unknown).collect();
+    let starts = starts(numbers, case, &asked);
     let idle = numbers.chance(0.4);
-    let (mut initial, mut variance) = (vec![], vec![]);
+    let mut variance = vec![];
     case.process.clear();
-    for Side { name, .. } in &sides {
-        let own = asked.start.iter().find(|start| start.name == *name);
-        let own = own.or_else(|| sides.iter().find(|side| side.name == *name));
-        let Some(own) = own else { continue };
-        let wide = sides
-            .iter()
-            .find(|s| s.name == *name)
-            .map_or(1.0, Side::width);
-        // in the start set or beside it
-        let off = numbers.between(-0.6, 0.6) * own.width();
-        let start = round(f64::midpoint(own.low, own.high) + off);
-        initial.push(format!("{name} = {start:?}"));
-        let share = numbers.size(0.3, 3.0) * (own.width() + 0.01 * wide);
+    for (name, [own, wide]) in starts {
+        let share = numbers.size(0.3, 3.0) * (own + 0.01 * wide);
         variance.push(format!("{name} = {:?}", round(share * share)));
         let density = match idle || numbers.chance(0.3) {
             true => 0.0,
             false => round(numbers.size(1e-5, 1e-2) * wide * wide),
         };
-        case.process.push((name.clone(), density));
+        case.process.push((name, density));
     }
-    case.key("initial", format!("{{ {} }}", initial.join(", ")));
     case.key("initial_variance", format!("{{ {} }}", variance.join(", ")));
     let width = case.states[0].width();
     for noise in &mut case.noise {
@@ -159,12 +145,50 @@ fn filter(numbers: &mut Numbers, case: &mut Case) {
         };
     }
     let count = numbers.between(3.0, 16.0).floor();
+    course(numbers, case, round(asked.until / count), true);
+}
+
+/// The run along which an observer of the papers is followed, whose inputs do not vary: beside a plant an observer has
+/// them as they are, and one that is given samples holds them.
+pub(super) fn followed(numbers: &mut Numbers, case: &mut Case) {
+    let Some(asked) = &mut case.tube else {
+        return;
+    };
+    asked.until *= numbers.size(0.05, 1.0);
+    let asked = asked.clone();
+    starts(numbers, case, &asked);
+    let count = numbers.between(3.0, 40.0).floor();
+    course(numbers, case, round(asked.until / count), false);
+    if let Some(course) = &mut case.course {
+        course.is_predicted = numbers.chance(0.5);
+    }
+}
+
+/// Where the estimate starts: in the start set or beside it. By names, how wide the start set is and the box.
+fn starts(numbers: &mut Numbers, case: &mut Case, asked: &Asked) -> Vec<(String, [f64; 2])> {
+    let unknown = |i: &&Input| matches!(i.role, Role::Unknown(_));
+    let unknown = case.inputs.iter().filter(unknown).map(|i| i.side.clone());
+    let sides: Vec<Side> = case.states.iter().cloned().chain(unknown).collect();
+    let (mut initial, mut widths) = (vec![], vec![]);
+    for side in sides {
+        let own = asked.start.iter().find(|start| start.name == side.name);
+        let own = own.unwrap_or(&side);
+        let off = numbers.between(-0.6, 0.6) * own.width();
+        let start = round(f64::midpoint(own.low, own.high) + off);
+        initial.push(format!("{} = {start:?}", side.name));
+        widths.push((side.name.clone(), [own.width(), side.width()]));
+    }
+    case.key("initial", format!("{{ {} }}", initial.join(", ")));
+    widths
+}
+
+fn course(numbers: &mut Numbers, case: &mut Case, every: f64, varies: bool) {
     let known = case.inputs.iter().filter(|i| i.role == Role::Known);
     let known = known.map(|input| {
         let Side { name, low, high } = &input.side;
         let middle = round(numbers.between(*low, *high));
         let most = (high - middle).min(middle - low).max(0.0);
-        let amplitude = match numbers.chance(0.4) {
+        let amplitude = match numbers.chance(0.4) || !varies {
             true => 0.0,
             false => round(0.9 * most * numbers.unit()),
         };
@@ -180,6 +204,7 @@ fn filter(numbers: &mut Numbers, case: &mut Case) {
     });
     case.course = Some(Course {
         known: known.collect(),
-        every: round(asked.until / count),
+        every,
+        is_predicted: false,
     });
 }

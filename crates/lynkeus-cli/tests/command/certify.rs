@@ -7,6 +7,7 @@ mod excited;
 mod filter;
 mod moving;
 mod noise;
+mod observer;
 mod printed;
 mod tube;
 

@@ -232,7 +232,7 @@ fn solve(augmented: &AugmentedPlant<'_>, Q: &[Node], b: &[Node]) -> Solution {
     let zeros = vec![graph.constant(0.0).node(); n];
     let alone = graph.solve(&A, &zeros).rcond;
     let ratio = graph.expr(solution.rcond) / WITHDRAWN;
-    let share = 1.0 - (-(ratio * ratio)).exp();
+    let share = 1.0 - (-ratio.powi(2)).exp();
     let x = solution.x.iter().zip(&scales);
     Solution {
         x: x.map(|(&x, &scale)| (graph.expr(x) * scale * share).node())

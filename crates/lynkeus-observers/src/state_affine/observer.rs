@@ -437,9 +437,12 @@ fn least_eigenvalue<'g>(A: &[Vec<Expr<'g>>]) -> Option<Expr<'g>> {
     let trace = trace(A)?;
     let mut B = divided(A, trace);
     let mut bound = 1.0 / trace;
+    let graph = trace.graph();
+    let [least, most] = [1.0 / A.len() as f64, 1.0].map(|t| graph.constant(t));
     for k in 0..SQUARINGS {
         let square = squared(&B);
-        let t = self::trace(&square)?;
+        // t is in [1/n, 1]: what encloses it would not know
+        let t = self::trace(&square)?.max(least).min(most);
         // t^{1/2^{k+1}} by square roots
         let root = (0..=k).fold(t, |t, _| t.sqrt());
         bound = bound / root;

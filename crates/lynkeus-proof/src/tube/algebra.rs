@@ -57,7 +57,6 @@ impl Models<'_> {
         }
         let range = self.range(x).hull(centre);
         let all = coefficients(range, power + 1);
-        let last = all.get(power + 1).copied().unwrap_or(Interval::ZERO);
         if !range.is_bounded() {
             return Model::unknown(self.ring);
         }
@@ -65,6 +64,16 @@ impl Models<'_> {
         if !all.iter().all(|c| c.is_bounded()) {
             return self.within(all[0]);
         }
+        let reach = (range - centre).magnitude();
+        let rest = |power: usize| {
+            let last = all.get(power + 1).copied().unwrap_or(Interval::ZERO);
+            (Interval::point(reach).powi(power as i32 + 1) * last).magnitude()
+        };
+        // what rounding takes is not worth another power
+        let enough = f64::EPSILON / 16.0 * all[0].magnitude();
+        let power = (1..power)
+            .find(|&power| rest(power) <= enough)
+            .unwrap_or(power);
         let series = coefficients(centre, power);
         let mut offset = x.clone();
         offset.coefficients[0] = 0.0;
@@ -72,9 +81,7 @@ impl Models<'_> {
         for &coefficient in series.iter().rev() {
             sum = self.times(&sum, &offset).plus(&self.within(coefficient));
         }
-        let reach = (range - centre).magnitude();
-        let reach = Interval::point(reach).powi(power as i32 + 1);
-        sum.rest = raised(sum.rest + (reach * last).magnitude(), 2);
+        sum.rest = raised(sum.rest + rest(power), 2);
         sum
     }
 
@@ -148,9 +155,26 @@ impl Models<'_> {
         }
     }
 
-    /// Gaussian elimination; a pivot that may be zero leaves nothing known.
-    fn eliminated(&self, a: &[Model], b: &[Model]) -> Vec<Model> {
+    /// The estimate of condition of a matrix with this determinant: the ratio of the last to the first diagonal entry of R in
+    /// A = QR with column pivots. The last is at least σ_n, the first at most ‖A‖_F, and the other singular values have a
+    /// product of at most (‖A‖_F²/(n − 1))^((n−1)/2).
+    fn condition(&self, a: &[Model], determinant: &Model, n: usize) -> Interval {
+        let squares = a.iter().map(|a| self.powi(a, 2));
+        let whole = squares.reduce(|sum, square| sum.plus(&square));
+        let whole = whole
+            .map_or(Interval::ZERO, |whole| self.range(&whole))
+            .sqrt();
+        let others = Interval::point(n as f64 - 1.0).powi(n as i32 - 1).sqrt();
+        let least =
+            Interval::point(self.range(determinant).mignitude()) * others / whole.powi(n as i32);
+        let least = if least.is_bounded() { least.lo() } else { 0.0 };
+        Interval::point(least.clamp(0.0, 1.0)).hull(Interval::ONE)
+    }
+
+    /// Gaussian elimination; a pivot that may be zero leaves nothing known. And the determinant but for its sign.
+    fn eliminated(&self, a: &[Model], b: &[Model]) -> (Vec<Model>, Model) {
         let n = b.len();
+        let mut determinant = self.number(1.0);
         let mut rows: Vec<Vec<Model>> = (0..n)
             .map(|i| a[i * n..][..n].iter().chain([&b[i]]).cloned().collect())
             .collect();
@@ -160,6 +184,7 @@ impl Models<'_> {
                 .max_by(|i, j| size(i).total_cmp(&size(j)))
                 .unwrap_or(k);
             rows.swap(k, best);
+            determinant = self.times(&determinant, &rows[k][k]);
             let pivot: Vec<Model> = rows[k][k + 1..]
                 .iter()
                 .map(|x| self.quotient(x, &rows[k][k]))
@@ -173,7 +198,8 @@ impl Models<'_> {
             rows[k].truncate(k + 1);
             rows[k].extend(pivot);
         }
-        rows.into_iter().filter_map(|mut row| row.pop()).collect()
+        let found = rows.into_iter().filter_map(|mut row| row.pop());
+        (found.collect(), determinant)
     }
 }
 
@@ -199,6 +225,10 @@ impl Algebra for Models<'_> {
         // the power 0 of what has no value has none
         if !x.rest.is_finite() {
             return Model::unknown(self.ring);
+        }
+        // a mere range: an even power is not negative
+        if x.coefficients[1..].iter().all(|c| *c == 0.0) {
+            return self.within(self.range(x).powi(n));
         }
         if n < 0 {
             return self.expanded(x, &|jets, t| jets.powi(t, n));
@@ -251,8 +281,9 @@ impl Algebra for Models<'_> {
     }
 
     fn solve(&self, a: &[Model], b: &[Model]) -> (Vec<Model>, Model) {
-        let rcond = self.within(Interval::ZERO.hull(Interval::ONE));
-        (self.eliminated(a, b), rcond)
+        let (x, determinant) = self.eliminated(a, b);
+        let rcond = self.condition(a, &determinant, b.len());
+        (x, self.within(rcond))
     }
 
     fn implicit(&self, function: &Implicit, p: &[Model]) -> Vec<Model> {

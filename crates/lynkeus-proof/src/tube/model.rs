@@ -130,6 +130,13 @@ impl Model {
         let (rows, others) = (self.rows(ring), other.rows(ring));
         let kept = (rows + others - 1).min(degree + 1);
         let mut coefficients = vec![0.0; kept * width];
+        // what is zero to the end of a row adds nothing
+        let end = |row: &[f64]| {
+            row.iter()
+                .rposition(|c| *c != 0.0)
+                .map_or(0, |last| last + 1)
+        };
+        let ends: Vec<usize> = other.coefficients.chunks(width).map(end).collect();
         for a in 0..rows.min(kept) {
             for i in 0..width {
                 let factor = self.coefficients[a * width + i];
@@ -138,7 +145,8 @@ impl Model {
                 }
                 let places = ring.products(i);
                 for b in 0..others.min(kept - a) {
-                    let row = &other.coefficients[b * width..][..places.len()];
+                    let length = places.len().min(ends[b]);
+                    let row = &other.coefficients[b * width..][..length];
                     let sums = &mut coefficients[(a + b) * width..][..width];
                     for (&place, &c) in places.iter().zip(row) {
                         sums[place as usize] += factor * c;
@@ -146,14 +154,24 @@ impl Model {
                 }
             }
         }
-        let (own, its) = (self.norm(), other.norm());
+        let (sizes, others) = (Sizes::of(self, ring), Sizes::of(other, ring));
+        let (own, its) = (sizes.whole, others.whole);
         // infinite where a coefficient overflows
         let whole = own * its;
         // a coefficient gets at most one term from each coefficient of either factor
-        let terms = self.entries().min(other.entries());
+        let terms = sizes.entries.min(others.entries);
+        // what is below rounding is left out
+        let mut swept = 0.0;
+        for c in &mut coefficients {
+            if c.abs() < 0.25 * f64::EPSILON * whole {
+                swept += c.abs();
+                *c = 0.0;
+            }
+        }
         let rounding = raised((terms as f64 + 1.0) * f64::EPSILON * whole, 4)
-            + self.entries() as f64 * other.entries() as f64 * f64::MIN_POSITIVE;
-        let lost = dropped(self, other, ring, degree);
+            + sizes.entries as f64 * others.entries as f64 * f64::MIN_POSITIVE;
+        let rounding = rounding + raised(swept, coefficients.len());
+        let lost = sizes.dropped(&others, degree);
         let left_out = own * other.rest + its * self.rest + self.rest * other.rest;
         let is_zero = own == 0.0 && self.rest == 0.0 || its == 0.0 && other.rest == 0.0;
         let rest = match is_zero {
@@ -163,10 +181,6 @@ impl Model {
             false => raised(lost + rounding + left_out + f64::MIN_POSITIVE, 8),
         };
         Self { coefficients, rest }
-    }
-
-    fn entries(&self) -> usize {
-        self.coefficients.iter().filter(|c| **c != 0.0).count()
     }
 
     /// ∫₀^τ, from τ⁰…τᵏ to τ⁰…τᵏ⁺¹.
@@ -285,39 +299,58 @@ impl Model {
     }
 }
 
-/// What a product leaves out: monomials beyond the order of the ring, powers of τ beyond `degree`.
-fn dropped(x: &Model, y: &Model, ring: &Ring, degree: usize) -> f64 {
-    let (x, y) = (blocks(x, ring), blocks(y, ring));
-    let mut lost = 0.0;
-    for (a, sizes) in x.iter().enumerate() {
-        for (b, others) in y.iter().enumerate() {
-            for (w, size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
-                let first = match a + b > degree {
-                    true => 0,
-                    false => ring.order() + 1 - w,
-                };
-                lost += others
-                    .iter()
-                    .skip(first)
-                    .map(|other| size * other)
-                    .sum::<f64>();
-            }
-        }
-    }
-    raised(lost, x.len() * y.len() * (ring.order() + 1).pow(2))
+/// How large the coefficients of a model are.
+struct Sizes {
+    /// of each power of τ, by weight: the norm of what has it, and of what has it or more
+    powers: Vec<Vec<[f64; 2]>>,
+    /// the norm
+    whole: f64,
+    /// how many are not zero
+    entries: usize,
 }
 
-/// Norms by power of τ and weight.
-fn blocks(x: &Model, ring: &Ring) -> Vec<Vec<f64>> {
-    let rows = x.coefficients.chunks(ring.len());
-    rows.map(|row| {
-        let mut sizes = vec![0.0; ring.order() + 1];
-        for (i, c) in row.iter().enumerate() {
-            sizes[ring.weight(i)] += c.abs();
+impl Sizes {
+    fn of(x: &Model, ring: &Ring) -> Self {
+        let mut entries = 0;
+        let mut power = |row: &[f64]| {
+            entries += row.iter().filter(|c| **c != 0.0).count();
+            let mut sizes = vec![[0.0; 2]; ring.order() + 1];
+            let mut tail = 0.0;
+            for (size, places) in sizes.iter_mut().zip(ring.by_weight()).rev() {
+                let own: f64 = row[places.clone()].iter().map(|c| c.abs()).sum();
+                tail += own;
+                *size = [own, tail].map(|sum| raised(sum, row.len() + ring.order()));
+            }
+            sizes
+        };
+        let powers: Vec<_> = x.coefficients.chunks(ring.len()).map(&mut power).collect();
+        let whole = powers.iter().map(|sizes| sizes[0][1]).sum();
+        Self {
+            whole: raised(whole, powers.len()),
+            powers,
+            entries,
         }
-        sizes.iter().map(|size| raised(*size, row.len())).collect()
-    })
-    .collect()
+    }
+
+    /// What a product leaves out: monomials beyond the order of the ring, powers of τ beyond `degree`.
+    fn dropped(&self, other: &Self, degree: usize) -> f64 {
+        let mut lost = 0.0;
+        for (a, sizes) in self.powers.iter().enumerate() {
+            for (b, others) in other.powers.iter().enumerate() {
+                lost += match a + b > degree {
+                    true => sizes[0][1] * others[0][1],
+                    // of weight w with what is too heavy beside it
+                    false => sizes[1..]
+                        .iter()
+                        .zip(others.iter().rev())
+                        .map(|([size, _], [_, heavy])| size * heavy)
+                        .sum(),
+                };
+            }
+        }
+        let order = self.powers[0].len();
+        raised(lost, self.powers.len() * other.powers.len() * order)
+    }
 }
 
 /// The sum of sizes, rounded up.

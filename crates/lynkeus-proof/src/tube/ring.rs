@@ -1,9 +1,12 @@
 //! The monomials of the polynomials of Taylor models, and where their products are.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
-/// Most monomials in the symbols of the start set.
+/// Most monomials in the symbols of the start set, and up to how many states: of more, which have more terms, fewer
+/// are bearable.
 const MOST: usize = 200;
+const STATES: usize = 7;
 
 /// Highest order in them.
 const HIGHEST: usize = 8;
@@ -16,7 +19,8 @@ const HIGHEST: usize = 8;
 pub(super) struct Ring {
     /// exponents, in the order of their weights; the first is the constant
     monomials: Vec<Vec<u8>>,
-    weights: Vec<usize>,
+    /// the places of the monomials of each weight
+    by_weight: Vec<Range<usize>>,
     /// `products[i][j]` is the place of monomial i · monomial j; j as far as the weight allows
     products: Vec<Vec<u32>>,
     order: usize,
@@ -41,7 +45,8 @@ impl Ring {
         let count = |order: usize| {
             (1..=order).fold(1_usize, |count, k| count.saturating_mul(start + k) / k)
         };
-        let fits = |order: &usize| count(*order) <= MOST;
+        let share = (STATES as f64 / remainder as f64).min(1.0).powi(3);
+        let fits = |order: &usize| count(*order) as f64 <= MOST as f64 * share;
         let order = match start {
             0 => 1,
             _ => (1..=HIGHEST).rev().find(fits).unwrap_or(1),
@@ -80,9 +85,10 @@ impl Ring {
                 .collect()
         };
         let products = (0..monomials.len()).map(row).collect();
+        let first = |w: usize| weights.partition_point(|&weight| weight < w);
         Self {
             monomials,
-            weights,
+            by_weight: (0..=order).map(|w| first(w)..first(w + 1)).collect(),
             products,
             order,
             start,
@@ -109,8 +115,9 @@ impl Ring {
         self.order
     }
 
-    pub fn weight(&self, monomial: usize) -> usize {
-        self.weights[monomial]
+    /// The places of the monomials of each weight.
+    pub fn by_weight(&self) -> &[Range<usize>] {
+        &self.by_weight
     }
 
     /// Where the products with monomials 0, 1, … are.

@@ -9,8 +9,8 @@ use super::model::{Model, raised};
 use super::ring::{Part, Ring};
 use super::zonotope::Zonotope;
 
-/// Powers of τ.
-const DEGREE: usize = 10;
+/// Powers of τ: where remainders limit the steps, fewer do.
+const DEGREES: std::ops::RangeInclusive<usize> = 4..=10;
 
 /// How large the coefficient of the last power may be, as a share of the largest value so far.
 const SMALL: f64 = 1e-10;
@@ -67,6 +67,8 @@ pub(super) struct Set {
     polynomial: Vec<Model>,
     zonotope: Zonotope,
     step: f64,
+    /// powers of τ
+    degree: usize,
 }
 
 /// A part of a tube between two times.
@@ -82,7 +84,8 @@ pub struct Segment {
     /// d
     reach: Vec<f64>,
     zonotope: Zonotope,
-    next: f64,
+    /// the step that is proposed next, with so many powers of τ
+    next: (f64, usize),
 }
 
 /// A step that is proved, and what it says about the next.
@@ -124,6 +127,7 @@ impl<'p> Stepper<'p> {
                 zonotope: Zonotope::origin(polynomial.len()),
                 polynomial,
                 step: (until - problem.from) / 64.0,
+                degree: *DEGREES.end(),
             },
             ring,
         }
@@ -212,10 +216,15 @@ impl<'p> Stepper<'p> {
             };
             let length = Interval::point(to) - Interval::point(self.set.time);
             let proposal = self.proposed(&start, length);
-            let last = self.last_power(&proposal);
-            let longer = (0.9 * (SMALL / last).powf(1.0 / DEGREE as f64)).clamp(0.2, 2.0);
-            if last.is_nan() || last > TOLERATED * SMALL {
-                step *= if last.is_nan() { 0.2 } else { longer.min(0.9) };
+            let last_power = self.last_power(&proposal);
+            let longer =
+                (0.9 * (SMALL / last_power).powf(1.0 / self.set.degree as f64)).clamp(0.2, 2.0);
+            if last_power.is_nan() || last_power > TOLERATED * SMALL {
+                step *= if last_power.is_nan() {
+                    0.2
+                } else {
+                    longer.min(0.9)
+                };
                 continue;
             }
             let Some(found) = self.proved(&start, &proposal, length) else {
@@ -236,10 +245,22 @@ impl<'p> Stepper<'p> {
                 last,
                 reach,
                 zonotope: self.set.zonotope.clone(),
-                next: step.min(4.0 * left) * longer.min(slower),
+                next: (
+                    step.min(4.0 * left) * longer.min(slower),
+                    self.degree(last_power, longer, slower),
+                ),
             });
         }
         None
+    }
+
+    /// How many powers of τ a step needs that is so many times as long as one with such a last power: their coefficients
+    /// fall geometrically. One more where the last power limits the steps.
+    fn degree(&self, last_power: f64, longer: f64, slower: f64) -> usize {
+        let ratio = last_power.powf(1.0 / self.set.degree as f64) * longer.min(slower);
+        let needed = (SMALL.ln() / ratio.ln()).ceil() as usize;
+        let more = usize::from(longer < slower && ratio < 1.0);
+        (needed + more).clamp(*DEGREES.start(), *DEGREES.end())
     }
 
     /// x₀ = p₀(s) + d ∘ q
@@ -283,7 +304,10 @@ impl<'p> Stepper<'p> {
     fn integral(&self, start: &[Model], f: &[Model], length: Interval) -> Vec<Model> {
         let length = self.within(length);
         let added = |(x, f): (&Model, &Model)| {
-            x.plus(&f.integral(&self.ring).times(&length, &self.ring, DEGREE))
+            x.plus(
+                &f.integral(&self.ring)
+                    .times(&length, &self.ring, self.set.degree),
+            )
         };
         start.iter().zip(f).map(added).collect()
     }
@@ -297,7 +321,7 @@ impl<'p> Stepper<'p> {
                 .collect()
         };
         let mut x = bare(start, 0);
-        for degree in 0..DEGREE {
+        for degree in 0..self.set.degree {
             let f = bare(&self.right(&x, length, degree), degree);
             x = bare(&self.integral(start, &f, length), degree + 1);
         }
@@ -312,8 +336,8 @@ impl<'p> Stepper<'p> {
             if !size.is_finite() {
                 return f64::NAN;
             }
-            let last: f64 = match x.rows(&self.ring) > DEGREE {
-                true => x.coefficients[DEGREE * self.ring.len()..]
+            let last: f64 = match x.rows(&self.ring) > self.set.degree {
+                true => x.coefficients[self.set.degree * self.ring.len()..]
                     .iter()
                     .map(|c| c.abs())
                     .sum(),
@@ -335,9 +359,10 @@ impl<'p> Stepper<'p> {
         largest
     }
 
-    /// The largest remainder as a share of the largest value so far.
+    /// The largest remainder as a share of the largest value so far; of what is zero all the time rounding leaves none.
     fn relative(&self, remainder: &[f64]) -> f64 {
         let shares = remainder.iter().zip(&self.scale);
+        let shares = shares.filter(|(e, _)| **e > TINY);
         shares
             .map(|(e, scale)| e / scale.max(TINY))
             .fold(TINY, f64::max)
@@ -348,7 +373,7 @@ impl<'p> Stepper<'p> {
         let mapped = |remainder: &[f64]| {
             let with = |(x, &rest): (&Model, &f64)| Model { rest, ..x.clone() };
             let x: Vec<Model> = proposal.iter().zip(remainder).map(with).collect();
-            let f = self.right(&x, length, DEGREE - 1);
+            let f = self.right(&x, length, self.set.degree - 1);
             let image = self.integral(start, &f, length);
             let distance = |(x, p): (&Model, &Model)| {
                 let difference = x.minus(p);
@@ -423,7 +448,8 @@ impl Segment {
             time: self.to,
             polynomial: vec![],
             zonotope: Zonotope::origin(0),
-            step: self.next,
+            step: self.next.0,
+            degree: self.next.1,
         };
         set.next(&self.ring, self.last, &self.zonotope, &self.reach)
     }
@@ -457,6 +483,7 @@ impl Set {
             polynomial,
             zonotope: zonotope.through(&L, reach, &around).beside(errors),
             step: self.step,
+            degree: self.degree,
         }
     }
 }
@@ -595,7 +622,7 @@ mod tests {
                 last: vec![model],
                 reach: zonotope.reach(),
                 zonotope: zonotope.clone(),
-                next: 1.0,
+                next: (1.0, 10),
             }
             .into_end();
             let polynomial = set.polynomial[0].norm();

@@ -52,20 +52,6 @@ pub(super) fn of(
         .map_err(explain)
 }
 
-/// Bounds of the noise of readings, one per measured output.
-pub(super) fn noises(
-    prepared: &Prepared<'_>,
-    augmented: &AugmentedPlant<'_>,
-) -> Result<Vec<f64>, Error> {
-    let region = augmented.region();
-    let errors = errors(prepared.declared(), augmented.plant, augmented, &region)?;
-    let alone = |error: ReadingError| ReadingError {
-        disturbed: 0.0,
-        ..error
-    };
-    Ok(errors.into_iter().map(|e| alone(e).bound()).collect())
-}
-
 /// Per augmented state: what disturbances within their declared ranges add to its
 /// derivative; for an unknown input the bound of its rate of change.
 fn drift(

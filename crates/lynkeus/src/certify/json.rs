@@ -5,8 +5,8 @@ use lynkeus_words::Words;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::error::told::ErrorEntry;
 use super::excited::ExcitationEntry;
-use super::filter::told::FilterEntry;
 use super::sampled::SampledEntry;
 use super::tube::told::TubeEntry;
 use super::{CertifyReport, Excited, Strays, bounds};
@@ -56,8 +56,8 @@ pub(crate) struct Proof<'a> {
     sampled: Option<SampledEntry>,
     /// whether the plant stays in the box from the starts of `[certify]`; null where that is not asked
     tube: Option<TubeEntry>,
-    /// what is proved of an extended Kalman filter from these starts; null for other observers
-    filter: Option<FilterEntry>,
+    /// what is proved of the observer's error from these starts; null where that is not asked
+    error_tube: Option<ErrorEntry>,
     /// what you should know
     notes: Vec<String>,
     /// what the family's theorem gives, where it was asked
@@ -137,7 +137,7 @@ impl<'a> From<&'a CertifyReport> for Proof<'a> {
             sampling: report.sampling.as_ref().map(|found| found.entry(true)),
             sampled: report.sampled.as_ref().map(SampledEntry::from),
             tube: report.tube.as_ref().map(TubeEntry::from),
-            filter: report.filter.as_ref().map(FilterEntry::from),
+            error_tube: report.error_tube.as_ref().map(ErrorEntry::from),
             notes: both
                 .flat_map(|certificate| report.notes_of(certificate))
                 .chain(report.assumed.iter().cloned())

@@ -63,8 +63,8 @@ impl Answer for CertifyReport {
         if let Some(tube) = &self.tube {
             tube.tell(&mut document);
         }
-        if let Some(filter) = &self.filter {
-            filter.tell(&mut document);
+        if let Some(error) = &self.error_tube {
+            error.tell(&mut document);
         }
         if let Some(excited) = &self.excited {
             excited.tell(&mut document);
@@ -113,10 +113,9 @@ fn conclusion(report: &CertifyReport) -> Line {
             Line::verdict("refuted").and(": an error grows, however small it is")
         }
         (Standing::Undecided, _) => {
-            let filter = report.filter.as_ref();
-            let filter = filter.map_or(String::new(), |found| format!("; {}", found.clause()));
-            Line::verdict("undecided")
-                .and(format!(": neither a proof nor a counterexample{filter}"))
+            let tube = report.error_tube.as_ref();
+            let tube = tube.map_or(String::new(), |found| format!("; {}", found.clause()));
+            Line::verdict("undecided").and(format!(": neither a proof nor a counterexample{tube}"))
         }
     }
 }

@@ -89,6 +89,8 @@ struct Followed {
     seen: Seen,
     /// why it proves nothing of the box
     obstacle: Option<String>,
+    /// from when on no step could be proved
+    stuck: Option<f64>,
 }
 
 /// The plant, what is known of it, and where it has to stay.
@@ -257,7 +259,7 @@ impl Question {
             Some(obstacle) => {
                 if let Some(witness) = self.leaves(budget) {
                     (tube.verdict, tube.witness) = (Standing::Refuted, Some(witness));
-                } else if let Some(parts) = self.in_parts(budget) {
+                } else if let Some(parts) = self.in_parts(whole.stuck, budget) {
                     (tube.verdict, seen) = (Standing::Proved, parts);
                 }
                 tube.obstacle = Some(obstacle).filter(|_| tube.verdict == Standing::Undecided);
@@ -293,6 +295,7 @@ impl Question {
             }
         });
         seen.reached = reached;
+        let stuck = (end == End::Stuck).then_some(reached);
         let ended = match end {
             End::Reached | End::Stopped => None,
             End::Stuck => Some(format!(
@@ -302,18 +305,23 @@ impl Question {
             End::Spent(spent) => Some(format!("it had come to {}: {spent}", number(reached))),
         };
         let obstacle = obstacle.or(ended);
-        Followed { seen, obstacle }
+        Followed {
+            seen,
+            obstacle,
+            stuck,
+        }
     }
 
     /// The tubes of halves of the start set, halves of these, and so on, if all are proved: a smaller part
     /// has a narrower tube.
-    fn in_parts(&self, budget: &Budget) -> Option<Seen> {
-        let mut open: Vec<(Problem, usize)> = self.halves(&self.problem, HALVINGS)?.into();
+    fn in_parts(&self, stuck: Option<f64>, budget: &Budget) -> Option<Seen> {
+        let halves = |part: &Part, stuck| part.halves(&self.problem, stuck);
+        let mut open = Vec::from(halves(&Part::whole(&self.problem), stuck)?);
         let mut all: Option<Seen> = None;
-        while let Some((problem, left)) = open.pop() {
-            let found = self.followed(&problem, true, budget);
+        while let Some(part) = open.pop() {
+            let found = self.followed(&part.problem, true, budget);
             if found.obstacle.is_some() {
-                open.extend(self.halves(&problem, left)?);
+                open.extend(halves(&part, found.stuck)?);
             } else if let Some(all) = &mut all {
                 all.join(&found.seen);
             } else {
@@ -321,29 +329,6 @@ impl Question {
             }
         }
         all
-    }
-
-    /// Both halves along the side that is widest beside the whole; none where so much was halved.
-    fn halves(&self, problem: &Problem, left: usize) -> Option<[(Problem, usize); 2]> {
-        let left = left.checked_sub(1)?;
-        let widths = |problem: &Problem| -> Vec<f64> {
-            let ranges = problem.start.iter().chain(&problem.constants);
-            ranges.map(|range| range.width()).collect()
-        };
-        let all = widths(&self.problem).into_iter().zip(widths(problem));
-        let shares = all.map(|(whole, part)| if whole > 0.0 { part / whole } else { 0.0 });
-        let widest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
-        let (place, share) = shares.enumerate().max_by(widest)?;
-        let half = |upper: bool| {
-            let mut part = problem.clone();
-            let ranges = part.start.iter_mut().chain(&mut part.constants);
-            for range in ranges.skip(place).take(1) {
-                let (low, high) = range.bisect();
-                *range = if upper { high } else { low };
-            }
-            (part, left)
-        };
-        (share > 0.0).then(|| [half(true), half(false)])
     }
 
     /// The first state that may be outside of its side.
@@ -442,6 +427,63 @@ impl Question {
             time,
             value: [value.lo(), value.hi()],
         })
+    }
+}
+
+/// A part of a start set.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub problem: Problem,
+    /// how often it may be halved
+    left: usize,
+    /// when what it is a half of got stuck
+    stuck: f64,
+    /// how often halving has not moved that
+    in_vain: usize,
+}
+
+impl Part {
+    /// All of it.
+    pub fn whole(problem: &Problem) -> Self {
+        Self {
+            problem: problem.clone(),
+            left: HALVINGS,
+            stuck: f64::NEG_INFINITY,
+            in_vain: 0,
+        }
+    }
+
+    /// Both halves along the side that is widest beside the whole, of a part that gets stuck at a time, if it does; none where
+    /// so much was halved, or every wide side in vain.
+    pub fn halves(&self, whole: &Problem, stuck: Option<f64>) -> Option<[Self; 2]> {
+        let widths = |problem: &Problem| -> Vec<f64> {
+            let ranges = problem.start.iter().chain(&problem.constants);
+            ranges.map(|range| range.width()).collect()
+        };
+        let all = widths(whole).into_iter().zip(widths(&self.problem));
+        let shares = all.map(|(whole, part)| if whole > 0.0 { part / whole } else { 0.0 });
+        let shares: Vec<f64> = shares.collect();
+        let wide = shares.iter().filter(|share| **share > 0.0).count();
+        let widest = |a: &(usize, &f64), b: &(usize, &f64)| a.1.total_cmp(b.1).then(b.0.cmp(&a.0));
+        let (place, _) = shares.iter().enumerate().max_by(widest)?;
+        let moved = stuck.is_none_or(|time| time > self.stuck);
+        let in_vain = if moved { 0 } else { self.in_vain + 1 };
+        let left = self.left.checked_sub(1)?;
+        let half = |upper: bool| {
+            let mut problem = self.problem.clone();
+            let ranges = problem.start.iter_mut().chain(&mut problem.constants);
+            for range in ranges.skip(place).take(1) {
+                let (low, high) = range.bisect();
+                *range = if upper { high } else { low };
+            }
+            Self {
+                problem,
+                left,
+                stuck: stuck.map_or(self.stuck, |time| time.max(self.stuck)),
+                in_vain,
+            }
+        };
+        (in_vain < wide).then(|| [half(true), half(false)])
     }
 }
 

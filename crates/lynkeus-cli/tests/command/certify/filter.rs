@@ -84,7 +84,7 @@ fn filter(folder: &Folder) -> Value {
     let found = ended.json()["certificate"].clone();
     let leaves = found["tube"]["verdict"] == "refuted";
     assert_eq!(ended.code, i32::from(leaves), "{ended:?}");
-    found["filter"].clone()
+    found["error_tube"].clone()
 }
 
 /// The hull of what rows have at a time.

@@ -1,11 +1,11 @@
-//! Runs of a study's own filter that try to leave its tube: starts, errors of readings and disturbances at the ends that
+//! Runs of a study's own filter or observer that try to leave the tube of its error: starts, errors of readings and disturbances at the ends that
 //! the slopes of one error, or of one deviation, ask for.
 
 use lynkeus::expr::{Evaluator, Interval, Node, Tape};
 use lynkeus::model::Variable;
 use lynkeus::run::Estimator;
 use lynkeus::structure::AugmentedPlant;
-use lynkeus::{FilterTube, Followed, Study};
+use lynkeus::{ErrorTube, Followed, Study};
 
 use super::case::{Case, Wave};
 use super::facts;
@@ -36,7 +36,7 @@ pub struct Worst {
 type Seen = Vec<Vec<f64>>;
 
 pub struct Attack<'a> {
-    tube: &'a FilterTube,
+    tube: &'a ErrorTube,
     followed: &'a Followed,
     /// at its start
     estimator: Estimator,
@@ -81,7 +81,7 @@ impl<'a> Attack<'a> {
         case: &Case,
         study: &Study,
         augmented: &AugmentedPlant<'_>,
-        tube: &'a FilterTube,
+        tube: &'a ErrorTube,
         is_exact: bool,
     ) -> Result<Self, String> {
         let plant = augmented.plant;
@@ -104,7 +104,7 @@ impl<'a> Attack<'a> {
                 Err(_) => place(&varying, &input.name).map(Source::Varying),
             },
         };
-        let outputs: Vec<String> = tube.readings.iter().map(|(name, _)| name.clone()).collect();
+        let outputs: Vec<String> = tube.readings.iter().map(|r| r.output.clone()).collect();
         let shown = |name: &String| {
             let own = plant.outputs.iter().find(|o| o.name == *name);
             own.map(|o| o.node)
@@ -186,7 +186,7 @@ impl<'a> Attack<'a> {
                     .map(|x| 0.5 * x)
                     .collect(),
             };
-            let quantity = numbers.below(2 * self.places.len());
+            let quantity = numbers.below(self.quantities());
             // at the end, or at any time
             let at = match target % 2 {
                 0 => 1.0,
@@ -239,6 +239,14 @@ impl<'a> Attack<'a> {
     /// and as it is until the next one.
     fn choices(&self) -> usize {
         self.tube.start.len() + self.times.len() * self.per_sample()
+    }
+
+    /// Errors, and a filter's deviations.
+    fn quantities(&self) -> usize {
+        match self.tube.is_filter {
+            true => 2 * self.places.len(),
+            false => self.places.len(),
+        }
     }
 
     fn per_sample(&self) -> usize {
@@ -367,7 +375,7 @@ impl<'a> Attack<'a> {
         if let Some(worst) = worst {
             let rows = &self.followed.rows;
             let row = rows.get(rows.partition_point(|row| row.1 < t));
-            match row.filter(|row| row.0 <= t && row.2.len() == found.len()) {
+            match row.filter(|row| row.0 <= t && row.2.len() >= found.len()) {
                 Some(row) => self.compare(t, x, &found, &row.2, worst, "there"),
                 None => {
                     worst.ratio = f64::INFINITY;
@@ -397,6 +405,9 @@ impl<'a> Attack<'a> {
     fn found(&self, x: &[f64], estimator: &Estimator) -> Vec<f64> {
         let hat = estimator.estimate();
         let errors = self.places.iter().zip(x).map(|(&i, x)| hat[i] - x);
+        if !self.tube.is_filter {
+            return errors.collect();
+        }
         let sd = estimator.deviations().unwrap_or(&[]);
         let sd = self
             .places
