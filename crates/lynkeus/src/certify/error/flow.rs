@@ -23,6 +23,9 @@ pub(super) fn excluded(augmented: &AugmentedPlant<'_>, observer: &Observer) -> O
     let n = augmented.states.len();
     let pairs = observer.states.iter().zip(&observer.estimates).take(n);
     let is_the_estimate = pairs.filter(|((s, _), e)| s.symbol == e.node).count() == n;
+    if !observer.generated.is_empty() {
+        return Some("an input with a `generator`".to_owned());
+    }
     let all = n + observer.states.len() + observer.measured.len();
     if !is_the_estimate {
         return Some("an observer whose first states are not the estimate".to_owned());
