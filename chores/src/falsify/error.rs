@@ -140,11 +140,10 @@ impl<'a> Attack<'a> {
             let [low, high] = facts::finite(v.min, v.max);
             high - low
         };
-        // as the tube has them, to the last bit
         let every = course.every;
-        let count = ((tube.until - tube.from) / every).floor();
+        let count = ((tube.until - tube.from) / every + 1e-9).floor();
         let samples: Vec<f64> = (0..=count as usize)
-            .map(|k| tube.from + k as f64 * every)
+            .map(|k| (tube.from + k as f64 * every).min(tube.until))
             .collect();
         let is_whole = followed.reached >= tube.until;
         let counts = |t: &f64| *t < followed.reached || (is_whole && *t <= tube.until);

@@ -145,11 +145,10 @@ fn filter(numbers: &mut Numbers, case: &mut Case) {
         };
     }
     let count = numbers.between(3.0, 16.0).floor();
-    course(numbers, case, round(asked.until / count), true);
+    course(numbers, case, round(asked.until / count));
 }
 
-/// The run along which an observer of the papers is followed, whose inputs do not vary: beside a plant an observer has
-/// them as they are, and one that is given samples holds them.
+/// The run along which an observer of the papers is followed.
 pub(super) fn followed(numbers: &mut Numbers, case: &mut Case) {
     let Some(asked) = &mut case.tube else {
         return;
@@ -158,7 +157,7 @@ pub(super) fn followed(numbers: &mut Numbers, case: &mut Case) {
     let asked = asked.clone();
     starts(numbers, case, &asked);
     let count = numbers.between(3.0, 40.0).floor();
-    course(numbers, case, round(asked.until / count), false);
+    course(numbers, case, round(asked.until / count));
     if let Some(course) = &mut case.course {
         course.is_predicted = numbers.chance(0.5);
     }
@@ -182,13 +181,13 @@ fn starts(numbers: &mut Numbers, case: &mut Case, asked: &Asked) -> Vec<(String,
     widths
 }
 
-fn course(numbers: &mut Numbers, case: &mut Case, every: f64, varies: bool) {
+fn course(numbers: &mut Numbers, case: &mut Case, every: f64) {
     let known = case.inputs.iter().filter(|i| i.role == Role::Known);
     let known = known.map(|input| {
         let Side { name, low, high } = &input.side;
         let middle = round(numbers.between(*low, *high));
         let most = (high - middle).min(middle - low).max(0.0);
-        let amplitude = match numbers.chance(0.4) || !varies {
+        let amplitude = match numbers.chance(0.4) {
             true => 0.0,
             false => round(0.9 * most * numbers.unit()),
         };

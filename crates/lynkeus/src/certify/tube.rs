@@ -178,14 +178,16 @@ impl Question {
             .inputs
             .iter()
             .cloned()
-            .chain(wandering)
+            .chain(wandering.iter().cloned())
             .chain(disturbances)
             .collect();
         let given: Vec<(Name, Interval)> = start
             .iter()
             .filter_map(|(name, low, high)| Some((name.clone(), Interval::new(*low, *high).ok()?)))
             .collect();
-        refuse_others(&given, &plant.name, states.iter().chain(&constants))?;
+        // one that wanders may start anywhere in its range here
+        let named = states.iter().chain(&constants).chain(&wandering);
+        refuse_others(&given, &plant.name, named)?;
         let usual = first_of(prepared)?;
         let first = |(state, usual): (&Variable, f64)| {
             let own = Name::best(&given, &state.name).copied();

@@ -227,6 +227,88 @@ fn the_gain_is_a_state_and_its_excitation_is_proved() {
     }
 }
 
+/// On a log known inputs are held from row to row: the tube is that of `estimate`, and not that of a plant whose observer
+/// sees its inputs all the time.
+#[test]
+fn known_inputs_are_held_between_samples() {
+    let plant = "\
+model Driven
+  input Real u(min = -2, max = 2);
+  Real x(start = 0, min = -3, max = 3);
+  Real v(start = 0, min = -5, max = 5);
+  output Real y = x;
+equation
+  der(x) = v;
+  der(v) = u - v - x;
+end Driven;
+";
+    let study = "\
+plant = \"m.mo\"
+[observer]
+family = \"triangular\"
+theta = 1
+[simulate]
+until = 3
+sample_step = 0.2
+output_step = 0.2
+inputs = { u = \"2*sin(3*time)\" }
+[estimate]
+between_samples = \"predict\"
+[certify]
+start = { x = [-0.01, 0.01] }
+";
+    let found = tube(&folder(plant, study));
+    assert_eq!(found["verdict"], "proved");
+    for start in ["{ x = -0.01, v = 0 }", "{ x = 0.01, v = 0 }"] {
+        let share = share(plant, study, start, &found, true);
+        assert!(share > 0.3 && share <= 1.0, "{start}: {share}");
+    }
+    let lines = study.replace("\"predict\"", "\"linear\"");
+    let found = tube(&folder(plant, &lines));
+    says(
+        found["obstacle"].as_str().unwrap(),
+        &["`between_samples = \"linear\"`"],
+    );
+}
+
+/// The sample at the end counts, although 3·0.1 is more than 0.3 by a rounding error: the reading's error is in the estimate.
+#[test]
+fn the_last_sample_is_not_lost_to_rounding() {
+    let plant = "\
+model Decay
+  Real x(start = 0, min = -3, max = 3);
+  output Real y = x;
+equation
+  der(x) = -8*x;
+end Decay;
+";
+    let study = "\
+plant = \"m.mo\"
+[sensors]
+noise = { y = { uniform = 0.1 } }
+[process_noise]
+x = 1
+[observer]
+family = \"ekf\"
+initial = { x = 0 }
+initial_variance = { x = 1 }
+[simulate]
+until = 0.3
+sample_step = 0.1
+[certify]
+start = { x = [-0.01, 0.01] }
+";
+    let found = tube(&folder(plant, study));
+    let rows = found["noisy"]["rows"].as_array().unwrap();
+    let width = |row: &Value| {
+        let [low, high] = ends(&row["error"]["x"]);
+        high - low
+    };
+    // it jumps there by most of the reading's error
+    let [before, last] = [rows.len() - 2, rows.len() - 1].map(|i| width(&rows[i]));
+    assert!(last > 1.3 * before, "{before} {last}");
+}
+
 /// An unknown constant in a wide range: the whole is too much for one tube, its parts are not.
 #[test]
 fn a_wide_start_set_is_taken_in_parts() {

@@ -22,6 +22,9 @@ pub(super) struct Beside<'m, 'g> {
     pub time: (Node, f64),
     /// known inputs as expressions of time, and their derivatives that the observer reads
     pub known: HashMap<Node, Node>,
+    /// known inputs that vary, and as an observer holds them from sample to sample
+    pub varying: Vec<Node>,
+    pub held: Vec<Node>,
     /// plant states and unknown inputs
     pub x: Vec<Node>,
     /// the estimates of these
@@ -65,6 +68,9 @@ impl<'m, 'g> Beside<'m, 'g> {
         let fresh = |name: &str, count: usize| -> Vec<Node> {
             (0..count).map(|_| graph.fresh(name).node()).collect()
         };
+        let varies = |u: &Node| graph.constant_value(known[u]).is_none();
+        let varying = augmented.inputs.iter().map(|u| u.node).filter(varies);
+        let varying: Vec<Node> = varying.collect();
         let (actual, inputs) = actual(prepared, augmented);
         let outputs = augmented.outputs.iter().map(|o| &o.variable);
         let shown = |output: &Variable| {
@@ -91,6 +97,8 @@ impl<'m, 'g> Beside<'m, 'g> {
             augmented,
             observer,
             time: (plant.time, from),
+            held: fresh("held", varying.len()),
+            varying,
             known,
             x: augmented.states.iter().map(|v| v.node).collect(),
             hats: observer.states.iter().take(n).map(|s| s.0.symbol).collect(),
@@ -114,6 +122,30 @@ impl<'m, 'g> Beside<'m, 'g> {
     /// With the known inputs as they are, and the estimate as x + e.
     pub fn put(&self, nodes: &[Node]) -> Vec<Expr<'g>> {
         self.put_with(nodes, self.known.clone())
+    }
+
+    /// With the known inputs as an observer holds them, and the estimate as x + e.
+    pub fn put_held(&self, nodes: &[Node]) -> Vec<Expr<'g>> {
+        self.put_with(nodes, self.held())
+    }
+
+    /// What stands for the known inputs where they are held.
+    pub fn held(&self) -> HashMap<Node, Node> {
+        let mut known = self.known.clone();
+        known.extend(self.varying.iter().copied().zip(self.held.iter().copied()));
+        known
+    }
+
+    /// The known inputs that vary, at a time.
+    pub fn varying(&self) -> Vec<Node> {
+        self.varying.iter().map(|u| self.known[u]).collect()
+    }
+
+    /// The same where it starts.
+    pub fn first_varying(&self) -> Vec<Node> {
+        let (time, from) = self.time;
+        let at = HashMap::from([(time, self.graph.constant(from).node())]);
+        self.graph.substitute(&self.varying(), &at)
     }
 
     /// With what else stands for what, and the estimate as x + e.

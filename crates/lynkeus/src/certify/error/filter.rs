@@ -7,8 +7,6 @@
 //! K = P cᵀ/(c P cᵀ + R), e⁺ = e + K (h(x) + ν − h(x̂⁻) − c (e − e⁻)), P⁺ = P − K c P,
 //! with the slopes c of h at x̂⁻, as the filter of `lynkeus-run` would in exact arithmetic.
 
-use std::collections::HashMap;
-
 use lynkeus_expr::{Expr, Node};
 use lynkeus_observers::Observer;
 use lynkeus_run::Level;
@@ -70,11 +68,9 @@ pub(super) fn equations(
     span: f64,
     notes: &mut Vec<String>,
 ) -> Result<Equations, String> {
-    let known = &beside.known;
-    let varies = |u: &Node| beside.graph.constant_value(known[u]).is_none();
-    let inputs = beside.augmented.inputs.iter().map(|u| u.node);
-    let varying: Vec<Node> = inputs.filter(varies).collect();
-    if !varying.is_empty() && prepared.study().estimate.between_samples == BetweenSamples::Linear {
+    if !beside.varying.is_empty()
+        && prepared.study().estimate.between_samples == BetweenSamples::Linear
+    {
         return Err("the tube of a filter follows known inputs that it holds between samples, not `between_samples = \"linear\"`".to_owned());
     }
     let densities = noise::densities(prepared, span, notes);
@@ -87,15 +83,13 @@ pub(super) fn equations(
     let model = Model {
         beside,
         P: fresh("P", n * (n + 1) / 2),
-        held: fresh("held", varying.len()),
-        varying,
     };
     Ok(Equations {
         first: model.first(),
         right: model.flow(&densities),
         sample: model.sample(&variances(prepared.declared(), beside.augmented)),
         variances: (0..n).map(|i| place(i, i)).collect(),
-        others: [model.P, model.held].concat(),
+        others: [&model.P[..], &beside.held].concat(),
         monitors: vec![],
     })
 }
@@ -120,29 +114,13 @@ fn place(i: usize, j: usize) -> usize {
 struct Model<'m, 'g> {
     beside: &'m Beside<'m, 'g>,
     P: Vec<Node>,
-    /// known inputs that vary, and as the filter holds them
-    varying: Vec<Node>,
-    held: Vec<Node>,
 }
 
 impl<'g> Model<'_, 'g> {
-    /// With the known inputs as the filter holds them, and the estimate as x + e.
-    fn put_held(&self, nodes: &[Node]) -> Vec<Expr<'g>> {
-        let mut known = self.beside.known.clone();
-        known.extend(self.varying.iter().copied().zip(self.held.iter().copied()));
-        self.beside.put_with(nodes, known)
-    }
-
-    /// The known inputs that vary, at a time.
-    fn varying(&self) -> Vec<Node> {
-        self.varying.iter().map(|u| self.beside.known[u]).collect()
-    }
-
     /// z₀
     fn first(&self) -> Vec<Node> {
-        let (graph, (time, from)) = (self.beside.graph, self.beside.time);
-        let at = HashMap::from([(time, graph.constant(from).node())]);
-        let held = graph.substitute(&self.varying(), &at);
+        let graph = self.beside.graph;
+        let held = self.beside.first_varying();
         let filter = self.beside.observer.filter.as_ref();
         let variance = filter.map_or(&[][..], |f| &f.initial_variance);
         let P = (0..self.beside.x.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
@@ -161,8 +139,8 @@ impl<'g> Model<'_, 'g> {
         let beside = self.beside;
         let n = beside.x.len();
         let derivatives = &beside.observer.derivatives[..n];
-        let estimated = self.put_held(derivatives);
-        let F = beside.slopes(derivatives, |nodes| self.put_held(nodes));
+        let estimated = beside.put_held(derivatives);
+        let F = beside.slopes(derivatives, |nodes| beside.put_held(nodes));
         let actual = beside.put(&beside.actual);
         let e = estimated.iter().zip(&actual).map(|(&hat, &x)| hat - x);
         let P = beside.exprs(&self.P);
@@ -178,7 +156,7 @@ impl<'g> Model<'_, 'g> {
             }
         }
         let still = beside.graph.constant(0.0).node();
-        all.extend(self.held.iter().map(|_| still));
+        all.extend(beside.held.iter().map(|_| still));
         all
     }
 
@@ -229,6 +207,6 @@ impl<'g> Model<'_, 'g> {
         }
         let x = beside.exprs(&beside.x);
         let all = x.into_iter().chain(e).chain(P).map(Expr::node);
-        all.chain(self.varying()).collect()
+        all.chain(beside.varying()).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! An observer of the papers, x̂' = F(x̂, q, u, y), q' = G(x̂, q, u, y): after x and e, what else it keeps, q (factors of S,
 //! a filtered input), and where its sensors report at samples the measurements w that it reads in place of y. Then
-//! w⁺ = h(x) + ν at a sample, and between samples w' = 0, or L_f h(x̂) where it is predicted. Sensors that are read
+//! w⁺ = h(x) + ν at a sample, and between samples w' = 0, or L_f h(x̂) where it is predicted; known inputs that vary are held
+//! from sample to sample, as on a log. Sensors that are read
 //! continuously show h(x) + ν at every time, ν being any measurable function.
 //!
 //! e' = F(x + e, q, u, y) − f(x, u)
@@ -48,7 +49,10 @@ pub(super) fn equations(
     let observer = beside.observer;
     let nodes = |all: Vec<Expr<'_>>| all.into_iter().map(Expr::node).collect::<Vec<Node>>();
     let read = nodes(beside.readings());
-    let mut map: HashMap<Node, Node> = beside.known.clone();
+    let mut map: HashMap<Node, Node> = match every {
+        Some(_) => beside.held(),
+        None => beside.known.clone(),
+    };
     let others = observer.states[n..].iter();
     let (mut others, starts): (Vec<Node>, Vec<f64>) = others
         .map(|(signal, start)| (signal.symbol, *start))
@@ -67,12 +71,19 @@ pub(super) fn equations(
             let still = || vec![constant(0.0); measured.len()];
             w = match between {
                 BetweenSamples::Predict => sampled.rates,
-                // along lines only a log can be read, which knows the next sample: a simulation holds them
-                BetweenSamples::Hold | BetweenSamples::Linear => still(),
+                BetweenSamples::Hold => still(),
+                BetweenSamples::Linear => return Err("the tube of the error does not follow measurements and inputs along lines between samples (`between_samples = \"linear\"`)".to_owned()),
             };
+            if !(beside.varying.is_empty() || observer.input_derivatives.is_empty()) {
+                return Err("the tube of the error does not follow derivatives of known inputs that are held from sample to sample".to_owned());
+            }
+            w.extend(beside.held.iter().map(|_| constant(0.0)));
             first.extend(still());
+            first.extend(beside.first_varying());
             sample.extend(&read);
+            sample.extend(beside.varying());
             others.extend(measured);
+            others.extend(&beside.held);
         }
     }
     let monitors: Vec<Node> = observer.monitors.iter().map(|m| m.node).collect();

@@ -4,10 +4,10 @@
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Interval, Node, Tape};
 use lynkeus_model::{Home, Variable};
-use lynkeus_observers::Observer;
+use lynkeus_observers::{Observer, ReadingError};
 use lynkeus_proof::tube::{Problem, Sampled};
 use lynkeus_structure::AugmentedPlant;
-use lynkeus_study::{Name, Noise};
+use lynkeus_study::{Name, Noise, bias_of};
 
 use super::super::tube::{bounded, first_of, refuse_others, side};
 use super::beside::{Beside, Equations, Reading};
@@ -81,14 +81,16 @@ impl System {
         if let Some(unsaid) = unsaid {
             return Ok(Err(unsaid.to_owned()));
         }
-        let count = every.map_or(0.0, |every| ((until - from) / every).floor());
+        // rounding loses no sample at the end
+        let whole = |every: f64| (until - from) / every * (1.0 + 4.0 * f64::EPSILON);
+        let count = every.map_or(0.0, |every| whole(every).floor());
         if count > SAMPLES {
             return Ok(Err(format!(
                 "{count} samples are too many to be followed one by one: an earlier `until`"
             )));
         }
         let times = every.map_or(vec![], |every| {
-            let time = |k: usize| from + k as f64 * every;
+            let time = |k: usize| (from + k as f64 * every).min(until);
             (0..=count as usize).map(time).collect()
         });
         let beside = Beside::of(prepared, augmented, observer, run, from)?;
@@ -301,7 +303,15 @@ fn starts(
         .filter_map(|(name, low, high)| Some((name.clone(), Interval::new(*low, *high).ok()?)))
         .collect();
     refuse_others(&given, &prepared.plant().name, augmented.states.iter())?;
-    let own = |v: &Variable| Name::best(&given, &v.name).copied();
+    // an offset of a sensor is anywhere within three of its deviations, as noise is
+    let bias = &prepared.study().sensors.bias;
+    let offset = |v: &Variable| {
+        let mut outputs = prepared.plant().outputs.iter();
+        let output = outputs.find(|o| bias_of(&o.name) == v.name)?;
+        let most = ReadingError::DEVIATIONS * Name::best(bias, &output.name)?;
+        Interval::new(-most, most).ok()
+    };
+    let own = |v: &Variable| Name::best(&given, &v.name).copied().or_else(|| offset(v));
     let usual = first_of(prepared)?;
     let states = states.iter().zip(usual);
     let states = states.map(|(v, usual)| own(v).unwrap_or(Interval::point(usual)));
