@@ -37,6 +37,14 @@ fn steep(observer: &str, rest: &str) -> Folder {
     folder
 }
 
+/// A plant `m.mo` with its study.
+fn folder(plant: &str, study: &str) -> Folder {
+    let folder = Folder::empty();
+    folder.write("m.mo", plant);
+    folder.write("study.toml", study);
+    folder
+}
+
 /// The column with the study of Figure 5.
 fn column() -> Folder {
     let folder = Folder::empty();

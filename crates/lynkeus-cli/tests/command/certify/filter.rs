@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::says;
+use super::{folder, says};
 use crate::Folder;
 
 const OSCILLATOR: &str = "model Oscillator
@@ -71,13 +71,6 @@ sd = true
 [certify]
 start = { a = [0.97, 1.03], b = [0.47, 0.55], load = [0.25, 0.33] }
 ";
-
-fn folder(plant: &str, study: &str) -> Folder {
-    let folder = Folder::empty();
-    folder.write("m.mo", plant);
-    folder.write("study.toml", study);
-    folder
-}
 
 fn filter(folder: &Folder) -> Value {
     let ended = folder.run(&["certify", "study.toml", "--json"]);

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::says;
+use super::{folder, says};
 use crate::Folder;
 
 const OSCILLATOR: &str = "\
@@ -58,13 +58,6 @@ inputs = { u1 = \"sin(11*pi*time)\", u2 = \"cos(11*pi*time)\", u3 = \"5*cos(2*pi
 [certify]
 start = { x1 = [0.99, 1.01], x2 = [0.49, 0.51], x3 = [0.49, 0.51] }
 ";
-
-fn folder(plant: &str, study: &str) -> Folder {
-    let folder = Folder::empty();
-    folder.write("m.mo", plant);
-    folder.write("study.toml", study);
-    folder
-}
 
 fn tube(folder: &Folder) -> Value {
     let ended = folder.run(&["certify", "study.toml", "--json"]);
