@@ -70,7 +70,7 @@ pub struct Effort {
 }
 
 /// For the tube of a filter, which may be stiff or have many dimensions: most come to their end with half as many. And for
-/// that of an observer, beside which the gain is proved, too.
+/// other tubes, beside which the gain is proved, too: one in some hundreds would take minutes.
 const LOOKS: [usize; 2] = [300, 6000];
 
 /// A limit that a seed reproduces, as no clock does: so many looks at it, of which a tube has two or more in each step. It is a
@@ -131,7 +131,7 @@ pub fn judge(
     for round in 0..3 {
         let study = desk.write(&case).map_err(|e| e.to_string())?;
         let mut study = Study::load(&study).map_err(|e| e.to_string())?;
-        if case.course.is_some() {
+        if case.tube.is_some() {
             // what is proved until then stands
             study.budget = so_many_looks(LOOKS[usize::from(case.kind != Kind::Filter)]);
         }

@@ -4,6 +4,10 @@ use nalgebra::DMatrix;
 
 use lynkeus_proof::spectrum::eigenvalues;
 
+pub use switching::Switching;
+
+mod switching;
+
 /// Factor between two intervals that are looked at.
 const FINER: f64 = 1.1;
 /// Intervals from this one on are looked at, in units of the fastest mode,

@@ -17,7 +17,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Budget, Interval, MissingInput, Node};
-use lynkeus_gain::sampling::SampledError;
+use lynkeus_gain::sampling::{SampledError, Switching};
 use lynkeus_proof::decay::{self, ErrorModel, Field, SampledProof, Samples, Sector};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{AugmentedPlant, Dimension, Innovation, Slopes, range};
@@ -48,8 +48,9 @@ pub struct SampledDecay {
     pub at: Option<AtSamples>,
     /// whether slopes count as they are together at each point of the box, or apart
     pub together: bool,
-    /// from how long equal intervals on the error grows where slopes stay at an end of their ranges, or as they are at
-    /// a point of the box; infinite where it was not seen to grow: what no proof of its kind can reach
+    /// an interval that some samples are never further apart than, and let the error grow, with slopes that change within
+    /// their ranges, or from one point of the box to another; infinite where it was not seen to grow: what no proof of its
+    /// kind can reach
     pub broken: f64,
     /// for readings that are held from one to the next of those; none where nothing bounds what they leave
     pub held: Option<AtSamples>,
@@ -236,7 +237,7 @@ impl SampledSystem {
         }
     }
 
-    /// The shortest interval at which slopes that stay at their ends let the error grow from sample to sample.
+    /// The shortest interval found that samples are never further apart than, and let the error grow.
     fn broken(&self, models: &[ErrorModel]) -> f64 {
         let n = self.scale.len();
         let mut C = DMatrix::zeros(self.shown.len(), n);
@@ -244,14 +245,39 @@ impl SampledSystem {
             C[(j, state)] = 1.0;
         }
         let S = decay::between_errors(n + self.shown.len(), &self.shown);
-        let ends = models.iter().flat_map(|model| {
-            let low = model.sectors.iter().map(|s| s.range.lo()).collect();
-            let high = model.sectors.iter().map(|s| s.range.hi()).collect();
-            [low, high, model.middles()].map(|θ: Vec<f64>| &S * model.at(&θ) * &S)
-        });
-        ends.fold(f64::INFINITY, |least, M| {
-            SampledError::new(M, &C).map_or(least, |error| least.min(error.predict(least)))
-        })
+        // a choice is of a model and, slope by slope, of an end or the middle of its range
+        let slopes = models.iter().map(|m| m.sectors.len()).max().unwrap_or(0);
+        let counts = [vec![models.len()], vec![3; slopes]].concat();
+        let of = |choice: &[usize]| {
+            let model = &models[choice[0]];
+            let slope = |(sector, place): (&Sector, &usize)| match place {
+                0 => sector.range.lo(),
+                1 => sector.range.hi(),
+                _ => sector.middle(),
+            };
+            let θ: Vec<f64> = model.sectors.iter().zip(&choice[1..]).map(slope).collect();
+            &S * model.at(&θ) * &S
+        };
+        let places = if slopes > 0 { 0..3 } else { 0..1 };
+        let alike = |model: usize| {
+            let places = places.clone();
+            places.map(move |place| [vec![model], vec![place; slopes]].concat())
+        };
+        let (mut equal, mut worst) = (f64::INFINITY, None);
+        for choice in (0..models.len()).flat_map(alike) {
+            let error = SampledError::new(of(&choice), &C);
+            let interval = error.map_or(equal, |error| error.predict(equal));
+            if interval < equal {
+                (equal, worst) = (interval, Some(choice));
+            }
+        }
+        let switching = Switching {
+            of: &of,
+            counts: &counts,
+            n,
+        };
+        let found = worst.and_then(|staying| switching.grows_from(&staying, equal));
+        found.unwrap_or(equal)
     }
 
     fn proof(&self, interval: f64, rate: f64, budget: &Budget) -> Option<SampledProof> {
@@ -349,7 +375,7 @@ struct Found {
     longest: Option<SampledProof>,
     /// for the interval asked about, where slopes count together
     at: Option<SampledProof>,
-    /// from how long intervals on the error grows at a point of the box, where slopes count together
+    /// the shortest interval found that lets the error grow, where slopes count together
     broken: Option<f64>,
 }
 

@@ -28,9 +28,10 @@ fn pieces(size: usize) -> usize {
     match size {
         0..=3 => 16,
         4 => 12,
-        5 => 8,
-        6..=12 => 4,
-        13..=24 => 2,
+        5..=8 => 8,
+        9..=12 => 6,
+        13..=16 => 5,
+        17..=24 => 2,
         _ => 1,
     }
 }
@@ -158,27 +159,21 @@ impl<'a> Search<'a> {
             .collect();
         let pieces = pieces(size);
         let mut problem = Problem::new(self.budget);
-        let split = problem.symmetric_where(size, |i, j| (i < n) == (j < n));
-        let rest = (0..pieces).map(|_| problem.symmetric(size));
-        let forms: Vec<Affine> = std::iter::once(split)
-            .chain(rest.collect::<Vec<_>>())
-            .collect();
         let unit = Affine::identity(size);
         let mut of_e = DMatrix::zeros(size, size);
         of_e.fill_diagonal(1.0);
         (n..size).for_each(|j| of_e[(j, j)] = 0.0);
-        let kept = forms[0].after(&of_e).times(&of_e);
-        problem.positive(forms[0].clone());
-        for (k, P) in forms.iter().enumerate() {
-            problem.positive(unit.minus(P));
-            if k > 0 {
-                problem.positive(P.minus(&kept));
-            }
-        }
         let length = interval / (frame.unit * pieces as f64);
-        let mut multipliers = vec![];
-        for ends in forms.windows(2) {
-            let change = ends[1].minus(&ends[0]).scaled(0.5 / length);
+        // from the last on, so that an unknown comes after those that it is coupled with, but for a few: P(0), which is
+        // coupled with all, comes last
+        let (mut forms, mut multipliers) = (vec![problem.symmetric(size)], vec![]);
+        for piece in (0..pieces).rev() {
+            let from = match piece {
+                0 => problem.symmetric_where(size, |i, j| (i < n) == (j < n)),
+                _ => problem.symmetric(size),
+            };
+            let to = &forms[forms.len() - 1];
+            let change = to.minus(&from).scaled(0.5 / length);
             let mut at = |P: &Affine| {
                 let each = seen.iter().map(|model| {
                     let PA = P.times(&model.A).plus(&change);
@@ -187,7 +182,18 @@ impl<'a> Search<'a> {
                 });
                 each.collect::<Vec<Affine>>()
             };
-            multipliers.push([at(&ends[0]), at(&ends[1])]);
+            multipliers.push([at(&from), at(to)]);
+            forms.push(from);
+        }
+        forms.reverse();
+        multipliers.reverse();
+        let kept = forms[0].after(&of_e).times(&of_e);
+        problem.positive(forms[0].clone());
+        for (k, P) in forms.iter().enumerate() {
+            problem.positive(unit.minus(P));
+            if k > 0 {
+                problem.positive(P.minus(&kept));
+            }
         }
         let point = problem.inside_soon().ok()?;
         let restored = |(T, model): (&Affine, &Seen)| -> DVector<f64> {

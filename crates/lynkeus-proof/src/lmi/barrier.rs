@@ -130,7 +130,10 @@ impl Barrier<'_> {
         let m = x.len();
         let mut slopes = vec![];
         let mut H = DMatrix::identity(m, m) * (2.0 / slack);
-        H.ger(4.0 / (slack * slack), x, x, 1.0);
+        // elsewhere it changes no digit, and leaves zeros where no inequality has both unknowns
+        if x.norm_squared() > f64::EPSILON * slack {
+            H.ger(4.0 / (slack * slack), x, x, 1.0);
+        }
         for (block, factor) in self.blocks.iter().zip(&factors) {
             block.derivatives(&factor.inverse(), &mut slopes, &mut H, self.budget);
         }
@@ -225,7 +228,7 @@ impl Curvature {
 }
 
 /// The factor of a matrix that may be large, panel by panel; none where it has none, or
-/// the budget ends.
+/// the budget ends. Panels of zeros stay: unknowns that come in the order in which inequalities couple them leave many.
 fn cholesky(mut L: DMatrix<f64>, budget: &Budget) -> Option<Cholesky<f64, Dyn>> {
     let n = L.ncols();
     for from in (0..n).step_by(PANEL) {
@@ -235,12 +238,17 @@ fn cholesky(mut L: DMatrix<f64>, budget: &Budget) -> Option<Cholesky<f64, Dyn>> 
         let to = (from + PANEL).min(n);
         panel(&mut L, from, to)?;
         let below = L.view((to, from), (n - to, to - from)).into_owned();
-        for first in (to..n).step_by(PANEL) {
-            let width = PANEL.min(n - first);
-            let mirrored = below.rows(first - to, width).transpose();
-            let taken = below.rows_range(first - to..);
-            let mut rest = L.view_mut((first, first), (n - first, width));
-            rest.gemm(-1.0, &taken, &mirrored, 1.0);
+        let panels: Vec<usize> = (to..n).step_by(PANEL).collect();
+        let height = |first: usize| PANEL.min(n - first);
+        let taken = |first: usize| below.rows(first - to, height(first));
+        let is_coupled = |first: &usize| taken(*first).iter().any(|x| *x != 0.0);
+        let coupled: Vec<usize> = panels.into_iter().filter(is_coupled).collect();
+        for (place, &right) in coupled.iter().enumerate() {
+            let mirrored = taken(right).transpose();
+            for &down in &coupled[place..] {
+                let mut rest = L.view_mut((down, right), (height(down), height(right)));
+                rest.gemm(-1.0, &taken(down), &mirrored, 1.0);
+            }
         }
     }
     Some(Cholesky::pack_dirty(L))

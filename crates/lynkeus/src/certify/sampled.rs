@@ -18,8 +18,8 @@ pub(super) struct SampledEntry {
     longest: Option<AtSamplesEntry>,
     /// for the samples of the study's simulation; null where it has none or they are not proved
     at: Option<AtSamplesEntry>,
-    /// from how long equal intervals on slopes that stay at an end of their ranges, or as they are at a point of the box,
-    /// would let the error grow; null where that was not seen
+    /// an interval that some samples are never further apart than, and would let the error grow, with slopes that change
+    /// within their ranges, or from one point of the box to another; null where that was not seen
     broken: Option<f64>,
     /// for readings that are held instead, as far apart as the study's: with the proof for continuous sensors
     held: Option<AtSamplesEntry>,
@@ -114,11 +114,11 @@ pub(super) fn tell(
     ));
     if found.broken.is_finite() {
         let slopes = match found.together {
-            true => "as they are at a point of the box",
-            false => "at an end of their ranges",
+            true => "from one point of the box to another",
+            false => "within their ranges",
         };
         document.item(format!(
-            "from {} apart on equal intervals would let it grow, with slopes that stay {slopes}",
+            "not up to {} apart: some would let it grow, with slopes that change {slopes}",
             number(found.broken)
         ));
     }
