@@ -79,10 +79,10 @@ fn proved_is_never_said_alone_of_samples_that_are_too_far_apart() {
     }
 }
 
-/// From equal samples 0.162 apart on the error grows (Runge and Kutta in 2,000 steps, by hand); every sequence of samples is proved
-/// up to nearly half of that.
+/// Of all sequences of up to four gaps, each one of six shares of 0.105, none lets the error grow; 0.11 and twice 0.022 in
+/// turn do, with a spectral radius of 1.03 (SciPy). Every sequence of samples is proved up to two thirds of that.
 #[test]
-fn samples_are_proved_to_nearly_half_of_what_breaks_them() {
+fn samples_are_proved_to_two_thirds_of_what_breaks_them() {
     let of = |step: f64| {
         let rest = format!(
             "[simulate]\nuntil = 20\noutput_step = {step}\n[estimate]\nbetween_samples = \"predict\""
@@ -97,8 +97,8 @@ fn samples_are_proved_to_nearly_half_of_what_breaks_them() {
     let number = |entry: &serde_json::Value| entry.as_f64().unwrap();
     let longest = number(&sampled["longest"]["interval"]);
     let broken = number(&sampled["broken"]);
-    assert!((0.155..0.168).contains(&broken), "{sampled}");
-    assert!((0.42 * broken..broken).contains(&longest), "{sampled}");
+    assert!((0.105..0.11).contains(&broken), "{sampled}");
+    assert!((0.62 * broken..broken).contains(&longest), "{sampled}");
     let rate = number(&certificate["rate"]);
     let at = &sampled["at"];
     assert_eq!(at["interval"], 0.05);

@@ -546,15 +546,23 @@ mod tests {
     /// Fewer rows than a panel, just as many, and several panels, against the matrix itself.
     #[test]
     fn factors_give_the_matrix_back() {
-        for n in [1, PANEL - 1, PANEL, PANEL + 1, 3 * PANEL + 7] {
-            let random = DMatrix::from_fn(n, n, |i, j| ((7 * i + 3 * j + i * j) as f64).sin());
-            let matrix = &random * random.transpose() + DMatrix::identity(n, n);
-            let factor = cholesky(matrix.clone(), &Budget::default()).unwrap();
-            let off = factor.l() * factor.l().transpose() - &matrix;
-            assert!(off.amax() < 1e-12 * matrix.amax() * n as f64);
-            let mut indefinite = matrix;
-            indefinite[(n - 1, n - 1)] = -1.0;
-            assert!(cholesky(indefinite, &Budget::default()).is_none());
+        let random = |i: usize, j: usize| ((7 * i + 3 * j + i * j) as f64).sin();
+        for n in [1, PANEL - 1, PANEL, PANEL + 1, 3 * PANEL + 7, 6 * PANEL] {
+            let full = DMatrix::from_fn(n, n, random);
+            // neighbours alone, and the last few with all: panels of zeros between
+            let arrow = DMatrix::from_fn(n, n, |i, j| match i + 5 > n || i.abs_diff(j) < 9 {
+                true => random(i, j),
+                false => 0.0,
+            });
+            for half in [full, arrow] {
+                let matrix = &half * half.transpose() + DMatrix::identity(n, n);
+                let factor = cholesky(matrix.clone(), &Budget::default()).unwrap();
+                let off = factor.l() * factor.l().transpose() - &matrix;
+                assert!(off.amax() < 1e-12 * matrix.amax() * n as f64);
+                let mut indefinite = matrix;
+                indefinite[(n - 1, n - 1)] = -1.0;
+                assert!(cholesky(indefinite, &Budget::default()).is_none());
+            }
         }
     }
 
