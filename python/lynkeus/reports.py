@@ -603,9 +603,9 @@ class SampledProof(Record):
     at: AtSamples | None
     """for the samples of the study's simulation; ``None`` where it has none or they are not proved"""
     broken: float | None
-    """an interval that some samples are never further apart than, and would let the error grow, with slopes
-    that change within their ranges, or from one point of the box to another; ``None`` where that was not
-    seen"""
+    """an interval T such that some sequence of samples at most T apart would let the error grow, if slopes
+    changed within their ranges, or from one point of the box to another, as the proof allows; ``None``
+    where that was not seen"""
     held: AtSamples | None
     """for readings that are held instead, as far apart as the study's: with the proof for continuous sensors"""
     obstacle: str | None

@@ -19,7 +19,7 @@ const SWEEPS: usize = 4;
 const WORSE: f64 = 1e-3;
 /// The shortest interval is sought to this factor.
 const ACCURATE: f64 = 1.01;
-/// How many courses are tried, in multiplications of numbers.
+/// Courses that are tried, times the cube of the size: about a second.
 const WORK: f64 = 1e8;
 
 /// Error systems (e, ε)' = M e, each as of a [`SampledError`](super::SampledError), any of which may hold at any time.
@@ -40,13 +40,13 @@ struct Course {
 }
 
 impl Switching<'_> {
-    /// The shortest interval found, at most `longest`, for which a course of choices, with samples no further apart,
-    /// lets e grow. None where none is found.
+    /// The shortest interval found, at most `longest`, such that some course with samples no further apart lets e grow;
+    /// none where none is found.
     ///
-    /// The search starts from slopes that stay as they are and equal gaps. It changes one of the gaps or slopes after
-    /// the other for the one with which the product of the flows has the largest spectral radius, for ever shorter
-    /// intervals. That is a lower bound of the joint spectral radius, below 1 of which no proof for all courses
-    /// exists (Jungers, *The Joint Spectral Radius*, 2009, section 1.2).
+    /// The search starts from slopes that stay as they are and equal gaps, and from the worst course found of fewer
+    /// samples. It changes one of the gaps or slopes after the other for the one with which the product of the flows has
+    /// the largest spectral radius, for shorter and shorter intervals. Where it is above 1, so is the joint spectral radius
+    /// of all courses, and no proof holds for them all (Jungers, *The Joint Spectral Radius*, 2009, section 1.2).
     #[must_use]
     pub fn grows_from(&self, staying: &[usize], longest: f64) -> Option<f64> {
         let size = (self.of)(staying).nrows();
@@ -54,21 +54,42 @@ impl Switching<'_> {
             return None;
         }
         let mut left = (WORK / (size * size * size) as f64) as usize;
-        let mut found = None;
+        let between = [&[0][..], &staying.repeat(PIECES)].concat();
+        let mut found: Option<(f64, Vec<usize>)> = None;
         for period in PERIODS {
-            let between = [&[0][..], &staying.repeat(PIECES)].concat();
-            let mut genes = between.repeat(period);
-            let mut finer = FINER;
-            while left > 0 && finer > ACCURATE {
-                let interval = found.unwrap_or(longest) / finer;
-                let course = self.worst(genes.clone(), interval, &mut left);
-                match course.grows() {
-                    true => (found, genes) = (Some(interval), course.genes),
-                    false => finer = finer.sqrt(),
-                }
+            let known = found.clone().map(|(_, genes)| genes);
+            for start in [Some(between.clone()), known].into_iter().flatten() {
+                let genes = start.into_iter().cycle().take(period * self.stride());
+                self.shortened(genes.collect(), longest, &mut found, &mut left);
             }
         }
-        found
+        found.map(|(interval, _)| interval)
+    }
+
+    /// From a course and what is found on, for as long as courses that grow are found for shorter intervals.
+    fn shortened(
+        &self,
+        mut genes: Vec<usize>,
+        longest: f64,
+        found: &mut Option<(f64, Vec<usize>)>,
+        left: &mut usize,
+    ) {
+        let mut finer = FINER;
+        while *left > 0 && finer > ACCURATE {
+            let interval = match found {
+                None => longest,
+                Some((interval, _)) => *interval / finer,
+            };
+            let course = self.worst(genes.clone(), interval, left);
+            match (course.grows(), &found) {
+                (true, _) => {
+                    genes.clone_from(&course.genes);
+                    *found = Some((interval, course.genes));
+                }
+                (false, None) => return,
+                (false, Some(_)) => finer = finer.sqrt(),
+            }
+        }
     }
 
     /// The worst course that single changes lead to, or the first that lets e grow.
@@ -87,8 +108,10 @@ impl Switching<'_> {
                     if course.grows() || *left == 0 {
                         return course;
                     }
-                    *left -= 1;
-                    course.try_at(gene, value, &mut flows);
+                    if course.genes[gene] != value {
+                        *left -= 1;
+                        course.try_at(gene, value, &mut flows);
+                    }
                 }
             }
             if course.radius <= before {
@@ -119,9 +142,6 @@ impl Course {
     /// Takes another value for a gene, if e grows more by it.
     fn try_at(&mut self, gene: usize, value: usize, flows: &mut Flows<'_>) {
         let before = std::mem::replace(&mut self.genes[gene], value);
-        if before == value {
-            return;
-        }
         let radius = flows.grown(&self.genes);
         match radius > self.radius * (1.0 + WORSE) {
             true => self.radius = radius,

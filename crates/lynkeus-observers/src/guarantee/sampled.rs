@@ -36,6 +36,9 @@ const SLOW: f64 = 0.01;
 /// Slopes are taken together where that makes the interval this much longer.
 const LONGER: f64 = 1.2;
 
+/// What an interval is beyond which equal samples let the error grow is known to a hundredth.
+const BEYOND: f64 = 1.015;
+
 /// How often what lies between that rate and the continuous one is halved, for given samples.
 const HALVINGS: usize = 5;
 
@@ -48,9 +51,9 @@ pub struct SampledDecay {
     pub at: Option<AtSamples>,
     /// whether slopes count as they are together at each point of the box, or apart
     pub together: bool,
-    /// an interval that some samples are never further apart than, and let the error grow, with slopes that change within
-    /// their ranges, or from one point of the box to another; infinite where it was not seen to grow: what no proof of its
-    /// kind can reach
+    /// an interval T such that some sequence of samples at most T apart lets the error grow, with slopes that change within
+    /// their ranges, or from one point of the box to another, as the proof allows; infinite where it was not seen to
+    /// grow: what no proof of its kind can reach
     pub broken: f64,
     /// for readings that are held from one to the next of those; none where nothing bounds what they leave
     pub held: Option<AtSamples>,
@@ -237,7 +240,8 @@ impl SampledSystem {
         }
     }
 
-    /// The shortest interval found that samples are never further apart than, and let the error grow.
+    /// The shortest interval T found such that some sequence of samples at most T apart lets the error grow. It is sought
+    /// where equal samples and slopes that stay let it grow in the end.
     fn broken(&self, models: &[ErrorModel]) -> f64 {
         let n = self.scale.len();
         let mut C = DMatrix::zeros(self.shown.len(), n);
@@ -276,8 +280,10 @@ impl SampledSystem {
             counts: &counts,
             n,
         };
-        let found = worst.and_then(|staying| switching.grows_from(&staying, equal));
-        found.unwrap_or(equal)
+        // it shrinks at `equal`, and grows from there on
+        let longest = BEYOND * equal;
+        let found = worst.and_then(|staying| switching.grows_from(&staying, longest));
+        found.unwrap_or(f64::INFINITY)
     }
 
     fn proof(&self, interval: f64, rate: f64, budget: &Budget) -> Option<SampledProof> {

@@ -18,8 +18,8 @@ pub(super) struct SampledEntry {
     longest: Option<AtSamplesEntry>,
     /// for the samples of the study's simulation; null where it has none or they are not proved
     at: Option<AtSamplesEntry>,
-    /// an interval that some samples are never further apart than, and would let the error grow, with slopes that change
-    /// within their ranges, or from one point of the box to another; null where that was not seen
+    /// an interval T such that some sequence of samples at most T apart would let the error grow, if slopes changed within
+    /// their ranges, or from one point of the box to another, as the proof allows; null where that was not seen
     broken: Option<f64>,
     /// for readings that are held instead, as far apart as the study's: with the proof for continuous sensors
     held: Option<AtSamplesEntry>,
@@ -118,7 +118,7 @@ pub(super) fn tell(
             false => "within their ranges",
         };
         document.item(format!(
-            "not up to {} apart: some would let it grow, with slopes that change {slopes}",
+            "not up to {} apart: some would let it grow, if slopes changed {slopes}, as the proof allows",
             number(found.broken)
         ));
     }
