@@ -10,6 +10,7 @@ use lynkeus::structure::{AugmentedPlant, Dimension, Standing, Verdict};
 use lynkeus::{ErrorTube, Tube};
 use nalgebra::DMatrix;
 
+use super::case::Case;
 use super::tally::Counts;
 
 /// |e(t)| ≤ overshoot·e^(−rate·t)·|e(0)| + ultimate bound, while plant and estimate
@@ -119,6 +120,22 @@ impl Findings {
         self.examination
             .as_ref()
             .is_some_and(|e| e.fit() == Standing::Proved)
+    }
+
+    /// The case with its inputs where all that is claimed has them: for inputs of `[simulate]` a certificate may hold
+    /// that does not for all that are declared.
+    pub fn meant(&self, case: &Case) -> Case {
+        let mut case = case.clone();
+        let sampled = self.sampled.iter().map(|(claim, ..)| claim);
+        let sides = self.claims.iter().chain(sampled).flat_map(|c| &c.sides);
+        for side in sides {
+            let mut inputs = case.inputs.iter_mut();
+            if let Some(input) = inputs.find(|input| input.side.name == side.name) {
+                input.side.low = input.side.low.max(side.min);
+                input.side.high = input.side.high.min(side.max);
+            }
+        }
+        case
     }
 
     fn new(prepared: &Prepared<'_>) -> Self {

@@ -146,8 +146,9 @@ pub fn judge(
         if tuned && round < 2 && retune::raised(&mut case, &found, augmented, numbers) {
             continue;
         }
+        let meant = found.meant(&case);
         let mut looked = Look {
-            case: &case,
+            case: &meant,
             augmented,
             found: &found,
             effort,

@@ -7,7 +7,8 @@ use super::case::{Asked, Case, Course, Input, Kind, Noise, Role, Side};
 use super::chance::Counted;
 use super::claims::Claim;
 use super::facts::{Fact, Facts};
-use super::judge::{Desk, attack, so_many_looks};
+use super::generate;
+use super::judge::{Desk, attack, judge, so_many_looks};
 use super::pair::Pair;
 use super::report::Options;
 use crate::numbers::Numbers;
@@ -383,6 +384,22 @@ fn too_many_runs_beyond_a_bound_are_counted() {
 }
 
 /// The same search as `cargo xtask falsify`, short.
+/// A gain that is proved for the input of `[simulate]` alone was attacked with all that the model declares.
+#[test]
+fn a_certificate_for_the_simulated_inputs_is_attacked_with_them() {
+    let mut numbers = Numbers::new(3201, 11_986);
+    let case = generate::case(&mut numbers, Kind::Designed);
+    let folder = std::env::temp_dir().join(format!("lynkeus-meant-{}", std::process::id()));
+    let options = Options::read(&[]).unwrap();
+    let judged = Desk::new(&folder)
+        .map_err(|e| e.to_string())
+        .and_then(|desk| judge(&case, &desk, &mut numbers, options.effort(11_986, 0), true));
+    let _ = std::fs::remove_dir_all(&folder);
+    let judged = judged.unwrap();
+    assert!(judged.counts.proved > 0);
+    assert!(judged.violations.is_empty(), "{:#?}", judged.violations);
+}
+
 #[test]
 fn a_short_search_finds_no_false_claim() {
     let folder = std::env::temp_dir().join(format!("lynkeus-falsify-{}", std::process::id()));

@@ -81,11 +81,18 @@ fn join(all: &mut Vec<Interval>, ranges: &[Interval]) {
     }
 }
 
+/// What is nearer to zero is told by this or zero: units of its digits are no numbers any more.
+const TINY: f64 = 1e-300;
+
 /// Four significant digits that hold all of the range.
 pub(crate) fn outward(range: Interval) -> String {
     let digits = |x: f64, up: bool| {
         if x == 0.0 || !x.is_finite() {
             return number(x);
+        }
+        if x.abs() < TINY {
+            let towards_zero = (x > 0.0) != up;
+            return number(if towards_zero { 0.0 } else { TINY.copysign(x) });
         }
         let unit = 10_f64.powi(x.abs().log10().floor() as i32 - 3);
         let near = (x / unit).round();
@@ -102,4 +109,20 @@ pub(crate) fn outward(range: Interval) -> String {
         digits(range.lo(), false),
         digits(range.hi(), true)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A state that rests at 0 has a range of a few of the smallest numbers: it was told as NaN.
+    #[test]
+    fn digits_hold_the_range_however_small_it_is() {
+        let least = f64::from_bits(1);
+        let told = |low: f64, high: f64| outward(Interval::new(low, high).unwrap());
+        assert_eq!(told(-least, least), "[-1e-300, 1e-300]");
+        assert_eq!(told(least, 2.0 * least), "[0, 1e-300]");
+        assert_eq!(told(0.0, 0.0), "[0, 0]");
+        assert_eq!(told(-1.00001, 1.00001), "[-1.001, 1.001]");
+    }
 }
