@@ -383,7 +383,6 @@ fn too_many_runs_beyond_a_bound_are_counted() {
     assert!(matches!(count(0.8), Some(Counted { evidence: Some(_) })));
 }
 
-/// The same search as `cargo xtask falsify`, short.
 /// A gain that is proved for the input of `[simulate]` alone was attacked with all that the model declares.
 #[test]
 fn a_certificate_for_the_simulated_inputs_is_attacked_with_them() {
@@ -400,6 +399,7 @@ fn a_certificate_for_the_simulated_inputs_is_attacked_with_them() {
     assert!(judged.violations.is_empty(), "{:#?}", judged.violations);
 }
 
+/// The same search as `cargo xtask falsify`, short.
 #[test]
 fn a_short_search_finds_no_false_claim() {
     let folder = std::env::temp_dir().join(format!("lynkeus-falsify-{}", std::process::id()));

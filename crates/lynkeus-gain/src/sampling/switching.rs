@@ -34,7 +34,7 @@ pub struct Switching<'a> {
 
 /// Per sample where in [`GAPS`] it has its gap, and what is chosen for each piece of it, one after the other.
 struct Course {
-    genes: Vec<usize>,
+    choices: Vec<usize>,
     /// the spectral radius of what it makes of e
     radius: f64,
 }
@@ -57,10 +57,10 @@ impl Switching<'_> {
         let between = [&[0][..], &staying.repeat(PIECES)].concat();
         let mut found: Option<(f64, Vec<usize>)> = None;
         for period in PERIODS {
-            let known = found.clone().map(|(_, genes)| genes);
+            let known = found.clone().map(|(_, choices)| choices);
             for start in [Some(between.clone()), known].into_iter().flatten() {
-                let genes = start.into_iter().cycle().take(period * self.stride());
-                self.shortened(genes.collect(), longest, &mut found, &mut left);
+                let choices = start.into_iter().cycle().take(period * self.stride());
+                self.shortened(choices.collect(), longest, &mut found, &mut left);
             }
         }
         found.map(|(interval, _)| interval)
@@ -69,7 +69,7 @@ impl Switching<'_> {
     /// From a course and what is found on, for as long as courses that grow are found for shorter intervals.
     fn shortened(
         &self,
-        mut genes: Vec<usize>,
+        mut choices: Vec<usize>,
         longest: f64,
         found: &mut Option<(f64, Vec<usize>)>,
         left: &mut usize,
@@ -80,11 +80,11 @@ impl Switching<'_> {
                 None => longest,
                 Some((interval, _)) => *interval / finer,
             };
-            let course = self.worst(genes.clone(), interval, left);
+            let course = self.worst(choices.clone(), interval, left);
             match (course.grows(), &found) {
                 (true, _) => {
-                    genes.clone_from(&course.genes);
-                    *found = Some((interval, course.genes));
+                    choices.clone_from(&course.choices);
+                    *found = Some((interval, course.choices));
                 }
                 (false, None) => return,
                 (false, Some(_)) => finer = finer.sqrt(),
@@ -93,24 +93,24 @@ impl Switching<'_> {
     }
 
     /// The worst course that single changes lead to, or the first that lets e grow.
-    fn worst(&self, genes: Vec<usize>, interval: f64, left: &mut usize) -> Course {
+    fn worst(&self, choices: Vec<usize>, interval: f64, left: &mut usize) -> Course {
         let mut flows = Flows {
             of: self,
             interval,
             known: HashMap::new(),
         };
-        let radius = flows.grown(&genes);
-        let mut course = Course { genes, radius };
+        let radius = flows.grown(&choices);
+        let mut course = Course { choices, radius };
         for _ in 0..SWEEPS {
             let before = course.radius;
-            for gene in 0..course.genes.len() {
-                for value in 0..self.values(gene) {
+            for place in 0..course.choices.len() {
+                for value in 0..self.values(place) {
                     if course.grows() || *left == 0 {
                         return course;
                     }
-                    if course.genes[gene] != value {
+                    if course.choices[place] != value {
                         *left -= 1;
-                        course.try_at(gene, value, &mut flows);
+                        course.try_at(place, value, &mut flows);
                     }
                 }
             }
@@ -121,13 +121,13 @@ impl Switching<'_> {
         course
     }
 
-    /// Genes from one sample to the next.
+    /// Entries of a course from one sample to the next.
     fn stride(&self) -> usize {
         1 + PIECES * self.counts.len()
     }
 
-    fn values(&self, gene: usize) -> usize {
-        match (gene % self.stride()).checked_sub(1) {
+    fn values(&self, place: usize) -> usize {
+        match (place % self.stride()).checked_sub(1) {
             None => GAPS.len(),
             Some(entry) => self.counts[entry % self.counts.len()],
         }
@@ -139,13 +139,13 @@ impl Course {
         self.radius > 1.0 + ROUNDING
     }
 
-    /// Takes another value for a gene, if e grows more by it.
-    fn try_at(&mut self, gene: usize, value: usize, flows: &mut Flows<'_>) {
-        let before = std::mem::replace(&mut self.genes[gene], value);
-        let radius = flows.grown(&self.genes);
+    /// Takes another value at a place, if e grows more by it.
+    fn try_at(&mut self, place: usize, value: usize, flows: &mut Flows<'_>) {
+        let before = std::mem::replace(&mut self.choices[place], value);
+        let radius = flows.grown(&self.choices);
         match radius > self.radius * (1.0 + WORSE) {
             true => self.radius = radius,
-            false => self.genes[gene] = before,
+            false => self.choices[place] = before,
         }
     }
 }
@@ -159,10 +159,10 @@ struct Flows<'a> {
 
 impl Flows<'_> {
     /// The spectral radius of what a course makes of e; 0 where it is not told.
-    fn grown(&mut self, genes: &[usize]) -> f64 {
+    fn grown(&mut self, choices: &[usize]) -> f64 {
         let (n, width) = (self.of.n, self.of.counts.len());
         let mut product = DMatrix::identity(n, n);
-        for between in genes.chunks(self.of.stride()) {
+        for between in choices.chunks(self.of.stride()) {
             let (gap, pieces) = (between[0], between[1..].chunks(width));
             let mut flow: Option<DMatrix<f64>> = None;
             for choice in pieces {

@@ -36,7 +36,8 @@ const SLOW: f64 = 0.01;
 /// Slopes are taken together where that makes the interval this much longer.
 const LONGER: f64 = 1.2;
 
-/// What an interval is beyond which equal samples let the error grow is known to a hundredth.
+/// Equal samples this much further apart than the longest interval at which the error was seen to shrink let it grow: that
+/// interval is known to a hundredth.
 const BEYOND: f64 = 1.015;
 
 /// How often what lies between that rate and the continuous one is halved, for given samples.

@@ -1,8 +1,8 @@
 //! An observer of the papers, x̂' = F(x̂, q, u, y), q' = G(x̂, q, u, y): after x and e, what else it keeps, q (factors of S,
 //! a filtered input), and where its sensors report at samples the measurements w that it reads in place of y. Then
 //! w⁺ = h(x) + ν at a sample, and between samples w' = 0, or L_f h(x̂) where it is predicted; known inputs that vary are held
-//! from sample to sample, as on a log. Sensors that are read
-//! continuously show h(x) + ν at every time, ν being any measurable function.
+//! from sample to sample, as on a log. Sensors that are read continuously show h(x) + ν at every time, ν being any
+//! measurable function.
 //!
 //! e' = F(x + e, q, u, y) − f(x, u)
 
